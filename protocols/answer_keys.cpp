@@ -98,6 +98,37 @@ std::string meant_by(const std::string& name) {
   return nearest;
 }
 
+constexpr NumberRange kCode{1, 255};  // 0: the rest between two pulses
+
+/// "response:" and each answer that somebody may give, in the order of their keys.
+std::vector<std::string> answer_events(const Protocol& protocol) {
+  std::vector<std::string> names;
+  const auto add = [&names](const std::string& answer) {
+    const std::string name = "response:" + answer;
+    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+  };
+  for (const auto& [key, stimulus] : protocol.response.keys) add(stimulus);
+  for (const TaskBlock& block : protocol.blocks) {
+    if (block.task == TaskKind::adjust) continue;  // its keys change the level
+    for (const TaskAnswer& answer : block.answers) add(answer.name);
+  }
+  return names;
+}
+
+/// Two events with one code would be indistinguishable in a recording.
+void refuse_equal_codes(const EventCodes& given, const EventCodes& all, const std::string& pointer,
+                        FaultList& faults) {
+  for (const auto& [name, code] : given) {
+    for (const auto& [other, same] : all) {
+      // Report a pair once, at the later name.
+      if (same != code || other == name || (given.contains(other) && other > name)) continue;
+      faults.add(child_pointer(pointer, name),
+                 "expected a unique code; " + std::to_string(code) + " is that of '" + other + "'");
+      break;
+    }
+  }
+}
+
 }  // namespace
 
 std::string key_fault(const std::string& name) {
@@ -131,41 +162,6 @@ std::string KeysTaken::add(const std::string& name) {
   const auto [before, is_new] = names_.emplace(one_key(name), name);
   return is_new ? "" : "expected another key: this is the same as '" + before->second + "'";
 }
-
-namespace {
-
-constexpr NumberRange kCode{1, 255};  // 0: the rest between two pulses
-
-/// "response:" and each answer that somebody may give, in the order of their keys.
-std::vector<std::string> answer_events(const Protocol& protocol) {
-  std::vector<std::string> names;
-  const auto add = [&names](const std::string& answer) {
-    const std::string name = "response:" + answer;
-    if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-  };
-  for (const auto& [key, stimulus] : protocol.response.keys) add(stimulus);
-  for (const TaskBlock& block : protocol.blocks) {
-    if (block.task == TaskKind::adjust) continue;  // its keys change the level
-    for (const TaskAnswer& answer : block.answers) add(answer.name);
-  }
-  return names;
-}
-
-/// Two events with one code would be indistinguishable in a recording.
-void refuse_equal_codes(const EventCodes& given, const EventCodes& all, const std::string& pointer,
-                        FaultList& faults) {
-  for (const auto& [name, code] : given) {
-    for (const auto& [other, same] : all) {
-      // Report a pair once, at the later name.
-      if (same != code || other == name || (given.contains(other) && other > name)) continue;
-      faults.add(child_pointer(pointer, name),
-                 "expected a unique code; " + std::to_string(code) + " is that of '" + other + "'");
-      break;
-    }
-  }
-}
-
-}  // namespace
 
 EventCodes usual_event_codes() {
   return {{"trial_start", 1}, {"first_contact", 2}, {"response", 3}, {"time_out", 4},

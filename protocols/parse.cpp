@@ -18,10 +18,6 @@
 #include "protocols/tasks/parse_blocks.h"
 
 namespace palpate::protocols {
-
-/// Reads `keys` of a response of version 1: every stimulus has one key, every label is its own.
-void read_response_keys(ObjectReader& response, Protocol& protocol);
-
 namespace {
 
 using nlohmann::json;
@@ -63,8 +59,7 @@ void check_labels(const Protocol& protocol, const std::string& pointer, FaultLis
   }
 }
 
-}  // namespace
-
+/// Reads `keys` of a response of version 1: every stimulus has one key, every label is its own.
 void read_response_keys(ObjectReader& response, Protocol& protocol) {
   const json* const keys = response.member("keys", Presence::required);
   if (keys == nullptr) return;
@@ -107,8 +102,6 @@ void read_response_keys(ObjectReader& response, Protocol& protocol) {
   }
 }
 
-namespace {
-
 // Keys and names from a file must not add lines to the list.
 std::string list(const std::vector<Fault>& faults) {
   std::string text;
@@ -122,15 +115,6 @@ std::string list(const std::vector<Fault>& faults) {
   }
   return text;
 }
-
-}  // namespace
-
-InputError::InputError(std::vector<Fault> faults)
-    : std::runtime_error(list(faults)), faults_(std::move(faults)) {}
-
-namespace {
-
-using nlohmann::json;
 
 // More than a laboratory needs; a larger value is a mistake.
 constexpr std::size_t kMaxStimuli = 100;
@@ -391,6 +375,9 @@ void check_schedule(const Protocol& protocol, FaultList& faults) {
 }
 
 }  // namespace
+
+InputError::InputError(std::vector<Fault> faults)
+    : std::runtime_error(list(faults)), faults_(std::move(faults)) {}
 
 Protocol parse_protocol(const std::string& path) {
   return parse_protocol_text(read_text_file(path), path);

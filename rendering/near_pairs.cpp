@@ -28,6 +28,8 @@ bool is_point(const stimuli::ConvexMesh& mesh, const Vec3& d) {
   return glm::dot(d, d) <= least * least;
 }
 
+using Kind = ContactFeature::Kind;
+
 /// A feature to start from. For a point, an edge is replaced by its left facet.
 template <bool kSegment>
 ContactFeature usable(const stimuli::ConvexMesh& mesh, ContactFeature feature) {
@@ -61,6 +63,14 @@ WalkResult walked(const stimuli::ConvexMesh& mesh, ContactFeature start, const V
                   const Vec3& d) {
   if constexpr (kSegment) return walk_segment(mesh, start, tip, d);
   return walk_point(mesh, start, tip);
+}
+
+WalkResult separating(const Measured& at) {
+  return {.feature = {},
+          .separating_feature = feature_of(at),
+          .normal = at.normal,
+          .depth = at.depth,
+          .probe_fraction = std::clamp(at.probe_fraction, 0.0, 1.0)};
 }
 
 /// Scans every facet of M, for lines whose steps rounding stops.
@@ -220,14 +230,6 @@ bool outward_facet(const CastMesh& part, ContactFeature start, const Vec3& tip, 
   return false;
 }
 
-WalkResult separating(const Measured& at) {
-  return {.feature = {},
-          .separating_feature = feature_of(at),
-          .normal = at.normal,
-          .depth = at.depth,
-          .probe_fraction = std::clamp(at.probe_fraction, 0.0, 1.0)};
-}
-
 template <bool kSegment>
 WalkResult scanned(const CastMesh& part, const Vec3& tip, const Vec3& d) {
   ++part.full_scans;
@@ -299,6 +301,154 @@ PairCast cast(const CastMesh& part, ContactFeature start, const Vec3& tip, const
   return scan<kSegment>(part, tip, d, motion);
 }
 
+/// m, of a segment above a plane, with the tool's tip at `tip`.
+double height_above(const Vec3& normal, double offset, const Vec3& tip,
+                    const PlacedSegment& segment) {
+  return glm::dot(normal, tip + segment.from) - offset +
+         std::min(0.0, glm::dot(normal, segment.along));
+}
+
+/// From a point to the nearest of a segment that starts at `to_start` from it.
+Vec3 to_nearest(const Vec3& to_start, const Vec3& along, double per_length2) {
+  return to_start - std::clamp(per_length2 * glm::dot(to_start, along), -1.0, 0.0) * along;
+}
+
+[[gnu::always_inline]] inline void prefetch(const stimuli::ConvexMesh& mesh,
+                                            ContactFeature feature) {
+  if (feature.kind == Kind::edge)
+    __builtin_prefetch(&mesh.edges()[feature.index]);
+  else
+    __builtin_prefetch(&mesh.facets()[feature.index]);
+}
+
+double inverse_length2(const Vec3& along) {
+  const double length2 = glm::dot(along, along);
+  return length2 > 0 ? 1 / length2 : 0;
+}
+
+/// A segment whose distance to many points is computed.
+struct Line {
+  Line() = default;
+  Line(const Vec3& start, const Vec3& d) : from(start), along(d) {
+    const double length2 = glm::dot(d, d);
+    per_length2 = length2 > 0 ? 1 / length2 : 0;
+  }
+  /// m^2, from p to the segment.
+  double distance2(const Vec3& p) const {
+    const Vec3 to = p - from;
+    const double t = std::clamp(per_length2 * glm::dot(to, along), 0.0, 1.0);
+    const Vec3 apart = to - t * along;
+    return glm::dot(apart, apart);
+  }
+
+  Vec3 from, along;        // m
+  double per_length2 = 0;  // 1/m^2
+};
+
+/// A part in contact stays: pressed through a thin plate, the virtual probe may be far from it.
+bool in_contact(const RenderState& state, std::uint32_t part) {
+  return state.parts[part].feature.kind != ContactFeature::Kind::none;
+}
+
+/// Lists a part if it is in reach; otherwise it bounds the clearance.
+template <class Distance2>
+void consider(const Scene& scene, RenderState& state, const Distance2& distance2, double step,
+              std::uint32_t index) {
+  const ScenePart& part = scene.parts()[index];
+  const double gap = std::sqrt(distance2(part.sphere_centre)) - part.sphere_radius;
+  if (in_reach(part, gap, step)) {
+    state.near_parts.push_back(index);
+  } else {
+    state.clearance = std::min(state.clearance, gap);
+  }
+}
+
+/// m, by which the part may approach before it counts as near.
+double room_before(const ScenePart& part, double gap) {
+  return gap - kReachShare * part.sphere_radius;
+}
+
+/// Lists the parts that may come near within `room`, m, and computes the room of the others. Skips
+/// spheres all of whose parts have more than both.
+template <class Distance2>
+void search_tree(const Scene& scene, NearbyParts& nearby, const Distance2& distance2, double room) {
+  struct Open {
+    std::uint32_t node = 0;
+    double distance2 = 0;  // m^2, from the middle of its sphere to the probe
+  };
+  const auto& nodes = scene.part_tree().nodes();
+  const auto& order = scene.part_tree().order();
+  const auto& spheres = scene.node_spheres();
+  nearby.parts.clear();
+  nearby.room = std::numeric_limits<double>::infinity();
+  std::array<Open, 64> stack{};  // halves at each level: 2^32 parts need 32
+  std::size_t count = 0;
+  stack[count++] = {0, distance2(spheres[0].centre)};
+  while (count > 0) {
+    const Open at = stack[--count];
+    // No part's sphere is larger than the one that holds it.
+    const double far = std::max(room, nearby.room) + (1 + kReachShare) * spheres[at.node].radius;
+    if (at.distance2 > far * far) continue;
+    const BoundingTree::Node& node = nodes[at.node];
+    for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
+      const ScenePart& part = scene.parts()[order[i]];
+      const double own =
+          room_before(part, std::sqrt(distance2(part.sphere_centre)) - part.sphere_radius);
+      if (own <= room)
+        nearby.parts.push_back(order[i]);
+      else
+        nearby.room = std::min(nearby.room, own);
+    }
+    if (node.count > 0) continue;
+    Open near{at.node + 1, distance2(spheres[at.node + 1].centre)};
+    Open other{node.first, distance2(spheres[node.first].centre)};
+    if (other.distance2 < near.distance2) std::swap(near, other);
+    stack[count++] = other;
+    stack[count++] = near;
+  }
+}
+
+/// \param distance2  from a point to the probe, m^2
+/// \param step       m, how far the probe may have moved past a part
+/// \param moved      m, of any point of the probe at most, since the nearby parts were listed
+/// \return whether the nearby parts were listed anew
+template <class Distance2>
+bool list_near_parts(const Scene& scene, RenderState& state, const Distance2& distance2,
+                     double step, double moved) {
+  state.clearance = std::numeric_limits<double>::infinity();
+  if (scene.part_tree().nodes().empty()) {
+    state.near_parts.clear();
+    for (std::uint32_t i = 0; i < scene.parts().size(); ++i) {
+      if (in_contact(state, i))
+        state.near_parts.push_back(i);
+      else
+        consider(scene, state, distance2, step, i);
+    }
+    return false;
+  }
+  // After a jump, or in a dense scene, the list is long. Replace it as soon as a shorter one
+  // suffices.
+  const double mean = scene.mean_radius(), soon = kReachShare * mean;
+  const bool leaps = step > soon;
+  double others = state.nearby.room - moved;  // m, at least, of every part that is not nearby
+  const bool anew = !(others > step);
+  if (anew) {
+    search_tree(scene, state.nearby, distance2, step + mean);
+    others = state.nearby.room;
+    if (state.nearby.parts.size() > Scene::kFewParts)
+      state.nearby.room = std::min(others, leaps ? soon : 2 * mean);
+  }
+  std::erase_if(state.near_parts, [&](std::uint32_t i) { return !in_contact(state, i); });
+  for (const std::uint32_t i : state.nearby.parts) {
+    if (!in_contact(state, i)) consider(scene, state, distance2, step, i);
+  }
+  state.clearance = std::min(state.clearance, others);
+  if (leaps || state.clearance == std::numeric_limits<double>::infinity())
+    state.clearance = std::min(state.clearance, soon);
+  std::sort(state.near_parts.begin(), state.near_parts.end());
+  return anew;
+}
+
 }  // namespace
 
 WalkResult locate(const CastMesh& part, ContactFeature start, const Vec3& tip, const Vec3& d) {
@@ -341,37 +491,6 @@ WalkResult measure(const stimuli::ConvexMesh& mesh, ContactFeature feature, cons
   return is_point(mesh, d) ? same_feature_point(mesh, usable<false>(mesh, feature), tip)
                            : same_feature_segment(mesh, feature, tip, d);
 }
-
-namespace {
-
-using Kind = ContactFeature::Kind;
-
-/// m, of a segment above a plane, with the tool's tip at `tip`.
-double height_above(const Vec3& normal, double offset, const Vec3& tip,
-                    const PlacedSegment& segment) {
-  return glm::dot(normal, tip + segment.from) - offset +
-         std::min(0.0, glm::dot(normal, segment.along));
-}
-
-/// From a point to the nearest of a segment that starts at `to_start` from it.
-Vec3 to_nearest(const Vec3& to_start, const Vec3& along, double per_length2) {
-  return to_start - std::clamp(per_length2 * glm::dot(to_start, along), -1.0, 0.0) * along;
-}
-
-[[gnu::always_inline]] inline void prefetch(const stimuli::ConvexMesh& mesh,
-                                            ContactFeature feature) {
-  if (feature.kind == Kind::edge)
-    __builtin_prefetch(&mesh.edges()[feature.index]);
-  else
-    __builtin_prefetch(&mesh.facets()[feature.index]);
-}
-
-double inverse_length2(const Vec3& along) {
-  const double length2 = glm::dot(along, along);
-  return length2 > 0 ? 1 / length2 : 0;
-}
-
-}  // namespace
 
 template <class Visit>
 void NearPairs::visit_near_parts(const Visit& visit) const {
@@ -518,133 +637,6 @@ bool NearPairs::virtual_inside() {
 }
 
 // Broad phase (scene.h): the parts that the probe can reach soon, by their bounding spheres.
-
-namespace {
-
-/// A segment whose distance to many points is computed.
-struct Line {
-  Line() = default;
-  Line(const Vec3& start, const Vec3& d) : from(start), along(d) {
-    const double length2 = glm::dot(d, d);
-    per_length2 = length2 > 0 ? 1 / length2 : 0;
-  }
-  /// m^2, from p to the segment.
-  double distance2(const Vec3& p) const {
-    const Vec3 to = p - from;
-    const double t = std::clamp(per_length2 * glm::dot(to, along), 0.0, 1.0);
-    const Vec3 apart = to - t * along;
-    return glm::dot(apart, apart);
-  }
-
-  Vec3 from, along;        // m
-  double per_length2 = 0;  // 1/m^2
-};
-
-/// A part in contact stays: pressed through a thin plate, the virtual probe may be far from it.
-bool in_contact(const RenderState& state, std::uint32_t part) {
-  return state.parts[part].feature.kind != ContactFeature::Kind::none;
-}
-
-/// Lists a part if it is in reach; otherwise it bounds the clearance.
-template <class Distance2>
-void consider(const Scene& scene, RenderState& state, const Distance2& distance2, double step,
-              std::uint32_t index) {
-  const ScenePart& part = scene.parts()[index];
-  const double gap = std::sqrt(distance2(part.sphere_centre)) - part.sphere_radius;
-  if (in_reach(part, gap, step)) {
-    state.near_parts.push_back(index);
-  } else {
-    state.clearance = std::min(state.clearance, gap);
-  }
-}
-
-/// m, by which the part may approach before it counts as near.
-double room_before(const ScenePart& part, double gap) {
-  return gap - kReachShare * part.sphere_radius;
-}
-
-/// Lists the parts that may come near within `room`, m, and computes the room of the others. Skips
-/// spheres all of whose parts have more than both.
-template <class Distance2>
-void search_tree(const Scene& scene, NearbyParts& nearby, const Distance2& distance2, double room) {
-  struct Open {
-    std::uint32_t node = 0;
-    double distance2 = 0;  // m^2, from the middle of its sphere to the probe
-  };
-  const auto& nodes = scene.part_tree().nodes();
-  const auto& order = scene.part_tree().order();
-  const auto& spheres = scene.node_spheres();
-  nearby.parts.clear();
-  nearby.room = std::numeric_limits<double>::infinity();
-  std::array<Open, 64> stack{};  // halves at each level: 2^32 parts need 32
-  std::size_t count = 0;
-  stack[count++] = {0, distance2(spheres[0].centre)};
-  while (count > 0) {
-    const Open at = stack[--count];
-    // No part's sphere is larger than the one that holds it.
-    const double far = std::max(room, nearby.room) + (1 + kReachShare) * spheres[at.node].radius;
-    if (at.distance2 > far * far) continue;
-    const BoundingTree::Node& node = nodes[at.node];
-    for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
-      const ScenePart& part = scene.parts()[order[i]];
-      const double own =
-          room_before(part, std::sqrt(distance2(part.sphere_centre)) - part.sphere_radius);
-      if (own <= room)
-        nearby.parts.push_back(order[i]);
-      else
-        nearby.room = std::min(nearby.room, own);
-    }
-    if (node.count > 0) continue;
-    Open near{at.node + 1, distance2(spheres[at.node + 1].centre)};
-    Open other{node.first, distance2(spheres[node.first].centre)};
-    if (other.distance2 < near.distance2) std::swap(near, other);
-    stack[count++] = other;
-    stack[count++] = near;
-  }
-}
-
-/// \param distance2  from a point to the probe, m^2
-/// \param step       m, how far the probe may have moved past a part
-/// \param moved      m, of any point of the probe at most, since the nearby parts were listed
-/// \return whether the nearby parts were listed anew
-template <class Distance2>
-bool list_near_parts(const Scene& scene, RenderState& state, const Distance2& distance2,
-                     double step, double moved) {
-  state.clearance = std::numeric_limits<double>::infinity();
-  if (scene.part_tree().nodes().empty()) {
-    state.near_parts.clear();
-    for (std::uint32_t i = 0; i < scene.parts().size(); ++i) {
-      if (in_contact(state, i))
-        state.near_parts.push_back(i);
-      else
-        consider(scene, state, distance2, step, i);
-    }
-    return false;
-  }
-  // After a jump, or in a dense scene, the list is long. Replace it as soon as a shorter one
-  // suffices.
-  const double mean = scene.mean_radius(), soon = kReachShare * mean;
-  const bool leaps = step > soon;
-  double others = state.nearby.room - moved;  // m, at least, of every part that is not nearby
-  const bool anew = !(others > step);
-  if (anew) {
-    search_tree(scene, state.nearby, distance2, step + mean);
-    others = state.nearby.room;
-    if (state.nearby.parts.size() > Scene::kFewParts)
-      state.nearby.room = std::min(others, leaps ? soon : 2 * mean);
-  }
-  std::erase_if(state.near_parts, [&](std::uint32_t i) { return !in_contact(state, i); });
-  for (const std::uint32_t i : state.nearby.parts) {
-    if (!in_contact(state, i)) consider(scene, state, distance2, step, i);
-  }
-  state.clearance = std::min(state.clearance, others);
-  if (leaps || state.clearance == std::numeric_limits<double>::infinity())
-    state.clearance = std::min(state.clearance, soon);
-  std::sort(state.near_parts.begin(), state.near_parts.end());
-  return anew;
-}
-
-}  // namespace
 
 void update_near_parts(const Scene& scene, RenderState& state, const LineProbe& probe,
                        const ToolPose& tool, bool sides) {

@@ -18,6 +18,114 @@ constexpr double kSmallRoom = 1e-6, kLargeRoom = 0.25;  // of the size
 constexpr double kStep = 0.02;                          // rad; larger turns are divided
 constexpr int kMostSteps = 64, kContactSteps = 8;       // steps of a tick; at a first contact
 
+using PatchKind = SurfacePatch::Kind;
+
+constexpr int kMostFaces = 64;      // to each side of a contact
+constexpr double kFlat = 1 - 5e-9;  // cosine of 1e-4 rad: rounding may bend a flat face so far
+
+/// Angle of the segment to a triangle, of the blend angle, -1 to 1; 1: its tip dips.
+double turned_to(const SurfaceTriangle& triangle, const Vec3& d, double length) {
+  const double slope = glm::dot(triangle.normal, d);
+  if (slope >= tick::kSinBlendAngle * length) return 1;
+  if (slope <= -tick::kSinBlendAngle * length) return -1;
+  return std::clamp(tick::small_asin(slope / length) / tick::kBlendAngle, -1.0, 1.0);
+}
+
+/// A segment that lies on a surface, from tip to tip + d.
+class Lying {
+ public:
+  Lying(const Surface& surface, const Vec3& tip, const Vec3& d)
+      : surface_(surface), tip_(tip), d_(d), length_(glm::length(d)) {}
+
+  struct Crossed {
+    tick::Portion portion;
+    std::uint32_t next;  ///< side of the triangle beyond
+  };
+
+  double turned(std::uint32_t triangle) const {
+    return turned_to(surface_.triangles()[triangle], d_, length_);
+  }
+
+  /// The portion of the segment over a triangle, in its plane, and the side where it leaves.
+  Crossed crossed(std::uint32_t index, bool towards_end) const {
+    const SurfaceTriangle& t = surface_.triangles()[index];
+    Crossed out{{}, 0};
+    double nearest = HUGE_VAL;
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const Vec3& a = surface_.vertices()[t.corners[k]];
+      const Vec3 inward = glm::cross(t.normal, surface_.vertices()[t.corners[(k + 1) % 3]] - a);
+      const double height = glm::dot(inward, tip_ - a), slope = glm::dot(inward, d_);
+      const double at_side = -height / slope;
+      out.portion.clip(height, slope);
+      if (!(towards_end ? slope < 0 : slope > 0)) continue;
+      const double way = towards_end ? at_side : -at_side;
+      if (way >= nearest) continue;
+      nearest = way;
+      out.next = t.across[k];
+    }
+    return out;
+  }
+
+  /// How far this triangle and the following ones, towards the end or the beginning, move the point
+  /// from `from`. Counts the triangles within the blend angle in `along`.
+  double way(std::uint32_t triangle, double from, bool towards_end, int& along) const {
+    double moved = 0;
+    for (int i = 0; i < kMostFaces; ++i) {
+      const double angle = turned(triangle);
+      if (towards_end ? angle >= 1 : angle <= -1) break;
+      const Crossed at = crossed(triangle, towards_end);
+      if (i > 0 && std::abs(angle) >= 1) break;
+      if (!(at.portion.enter <= at.portion.leave) && i > 0) break;
+      const double end =
+          towards_end ? std::max(from, at.portion.leave) : std::min(from, at.portion.enter);
+      along += std::abs(angle) < 1;
+      moved += (end - from) * 0.5 * (towards_end ? 1 - angle : 1 + angle);
+      from = end;
+      if (towards_end ? from >= 1 : from <= 0) break;
+      const SurfaceTriangle& beyond = surface_.triangles()[SurfaceTriangle::triangle_of(at.next)];
+      const std::uint32_t side = SurfaceTriangle::side_of(at.next);
+      // Across a hollow, the segment touches only one of its sides.
+      if ((!beyond.touches(side) || beyond.folded(side)) &&
+          glm::dot(beyond.normal, surface_.triangles()[triangle].normal) < kFlat)
+        break;
+      triangle = SurfaceTriangle::triangle_of(at.next);
+    }
+    return moved;
+  }
+
+  double length() const { return length_; }
+
+ private:
+  const Surface& surface_;
+  Vec3 tip_, d_;
+  double length_;
+};
+
+/// Where the segment touches: equation (2) over the triangles that it lies along.
+/// \param at  of the patch's own contact point on the segment
+double place_on(const Surface& surface, const SurfacePatch& patch, const Vec3& tip, const Vec3& d,
+                double at, ContactType& type) {
+  const Lying lying(surface, tip, d);
+  const std::uint32_t left = patch.triangle();
+  int along = 0;
+  double place = at;
+  if (patch.kind == PatchKind::edge) {
+    const std::uint32_t right = SurfaceTriangle::triangle_of(
+        surface.triangles()[left].across[SurfaceTriangle::side_of(patch.side)]);
+    // The triangle ahead slopes down along the segment.
+    const bool left_ahead = by_tip(surface.triangles()[left], d);
+    const std::uint32_t ahead = left_ahead ? left : right, behind = left_ahead ? right : left;
+    place += lying.way(ahead, at, true, along);
+    place += lying.way(behind, at, false, along);
+  } else {
+    place += lying.way(left, at, true, along);
+    place += lying.way(left, at, false, along);
+  }
+  if (along == 0) return at;
+  type = ContactType::segment_face;
+  return std::clamp(place, 0.0, 1.0);
+}
+
 }  // namespace
 
 /// Local frame.
@@ -191,118 +299,6 @@ void follow_on_surface(UnionTick& tick, std::uint32_t surface) {
 bool inside_surface(UnionTick& tick, std::uint32_t surface) {
   return SurfaceTool(tick, surface).virtual_inside();
 }
-
-namespace {
-
-using PatchKind = SurfacePatch::Kind;
-
-constexpr int kMostFaces = 64;      // to each side of a contact
-constexpr double kFlat = 1 - 5e-9;  // cosine of 1e-4 rad: rounding may bend a flat face so far
-
-/// Angle of the segment to a triangle, of the blend angle, -1 to 1; 1: its tip dips.
-double turned_to(const SurfaceTriangle& triangle, const Vec3& d, double length) {
-  const double slope = glm::dot(triangle.normal, d);
-  if (slope >= tick::kSinBlendAngle * length) return 1;
-  if (slope <= -tick::kSinBlendAngle * length) return -1;
-  return std::clamp(tick::small_asin(slope / length) / tick::kBlendAngle, -1.0, 1.0);
-}
-
-/// A segment that lies on a surface, from tip to tip + d.
-class Lying {
- public:
-  Lying(const Surface& surface, const Vec3& tip, const Vec3& d)
-      : surface_(surface), tip_(tip), d_(d), length_(glm::length(d)) {}
-
-  struct Crossed {
-    tick::Portion portion;
-    std::uint32_t next;  ///< side of the triangle beyond
-  };
-
-  double turned(std::uint32_t triangle) const {
-    return turned_to(surface_.triangles()[triangle], d_, length_);
-  }
-
-  /// The portion of the segment over a triangle, in its plane, and the side where it leaves.
-  Crossed crossed(std::uint32_t index, bool towards_end) const {
-    const SurfaceTriangle& t = surface_.triangles()[index];
-    Crossed out{{}, 0};
-    double nearest = HUGE_VAL;
-    for (std::uint32_t k = 0; k < 3; ++k) {
-      const Vec3& a = surface_.vertices()[t.corners[k]];
-      const Vec3 inward = glm::cross(t.normal, surface_.vertices()[t.corners[(k + 1) % 3]] - a);
-      const double height = glm::dot(inward, tip_ - a), slope = glm::dot(inward, d_);
-      const double at_side = -height / slope;
-      out.portion.clip(height, slope);
-      if (!(towards_end ? slope < 0 : slope > 0)) continue;
-      const double way = towards_end ? at_side : -at_side;
-      if (way >= nearest) continue;
-      nearest = way;
-      out.next = t.across[k];
-    }
-    return out;
-  }
-
-  /// How far this triangle and the following ones, towards the end or the beginning, move the point
-  /// from `from`. Counts the triangles within the blend angle in `along`.
-  double way(std::uint32_t triangle, double from, bool towards_end, int& along) const {
-    double moved = 0;
-    for (int i = 0; i < kMostFaces; ++i) {
-      const double angle = turned(triangle);
-      if (towards_end ? angle >= 1 : angle <= -1) break;
-      const Crossed at = crossed(triangle, towards_end);
-      if (i > 0 && std::abs(angle) >= 1) break;
-      if (!(at.portion.enter <= at.portion.leave) && i > 0) break;
-      const double end =
-          towards_end ? std::max(from, at.portion.leave) : std::min(from, at.portion.enter);
-      along += std::abs(angle) < 1;
-      moved += (end - from) * 0.5 * (towards_end ? 1 - angle : 1 + angle);
-      from = end;
-      if (towards_end ? from >= 1 : from <= 0) break;
-      const SurfaceTriangle& beyond = surface_.triangles()[SurfaceTriangle::triangle_of(at.next)];
-      const std::uint32_t side = SurfaceTriangle::side_of(at.next);
-      // Across a hollow, the segment touches only one of its sides.
-      if ((!beyond.touches(side) || beyond.folded(side)) &&
-          glm::dot(beyond.normal, surface_.triangles()[triangle].normal) < kFlat)
-        break;
-      triangle = SurfaceTriangle::triangle_of(at.next);
-    }
-    return moved;
-  }
-
-  double length() const { return length_; }
-
- private:
-  const Surface& surface_;
-  Vec3 tip_, d_;
-  double length_;
-};
-
-/// Where the segment touches: equation (2) over the triangles that it lies along.
-/// \param at  of the patch's own contact point on the segment
-double place_on(const Surface& surface, const SurfacePatch& patch, const Vec3& tip, const Vec3& d,
-                double at, ContactType& type) {
-  const Lying lying(surface, tip, d);
-  const std::uint32_t left = patch.triangle();
-  int along = 0;
-  double place = at;
-  if (patch.kind == PatchKind::edge) {
-    const std::uint32_t right = SurfaceTriangle::triangle_of(
-        surface.triangles()[left].across[SurfaceTriangle::side_of(patch.side)]);
-    // The triangle ahead slopes down along the segment.
-    const bool left_ahead = by_tip(surface.triangles()[left], d);
-    const std::uint32_t ahead = left_ahead ? left : right, behind = left_ahead ? right : left;
-    place += lying.way(ahead, at, true, along);
-    place += lying.way(behind, at, false, along);
-  } else {
-    place += lying.way(left, at, true, along);
-    place += lying.way(left, at, false, along);
-  }
-  if (along == 0) return at;
-  type = ContactType::segment_face;
-  return std::clamp(place, 0.0, 1.0);
-}
-
-}  // namespace
 
 void SurfaceTool::add_contact(const SurfacePlane& plane, const Vec3& shift) {
   const PosedTool::Segment& segment = turned_.segments[plane.patch.segment];

@@ -59,6 +59,33 @@ double hidden_way(double size, double skin, double depth) {
   return std::max(kSameValley * size, kHiddenWay * std::sqrt(skin * depth));
 }
 
+constexpr int kPushRounds = 12;          // pushes out of patches that a turn meets
+constexpr double kLeastTurn = 1.0 / 16;  // of the turn; a shorter one waits for the next tick
+constexpr double kFarPush = 8;           // times the turn's motion; a longer push fails
+constexpr double kLonger = 1e-11;        // of the size; a sweep extends edges by it
+
+/// m, the farthest motion of a segment end.
+double most_moved(const PosedTool& from, const PosedTool& to, const Vec3& shift) {
+  double most2 = 0;
+  for (std::size_t j = 0; j < to.count; ++j) {
+    const Vec3 start = to.segments[j].start + shift - from.segments[j].start;
+    const Vec3 end = start + to.segments[j].along - from.segments[j].along;
+    most2 = std::max({most2, glm::dot(start, start), glm::dot(end, end)});
+  }
+  return std::sqrt(most2);
+}
+
+/// rad, the largest turn of a segment.
+double most_turned(const PosedTool& from, const PosedTool& to) {
+  double most2 = 0;
+  for (std::size_t j = 0; j < to.count; ++j) {
+    const Vec3 turn = to.segments[j].along - from.segments[j].along;
+    const double length2 = glm::dot(to.segments[j].along, to.segments[j].along);
+    if (length2 > 0) most2 = std::max(most2, glm::dot(turn, turn) / length2);
+  }
+  return std::sqrt(most2);
+}
+
 }  // namespace
 
 /// Lists the patches of a triangle that the listed tool can touch, or could if it were turned by
@@ -532,37 +559,6 @@ void SurfaceTool::find_rest() {
   }
   stuck_ = true;
 }
-
-namespace {
-
-constexpr int kPushRounds = 12;          // pushes out of patches that a turn meets
-constexpr double kLeastTurn = 1.0 / 16;  // of the turn; a shorter one waits for the next tick
-constexpr double kFarPush = 8;           // times the turn's motion; a longer push fails
-constexpr double kLonger = 1e-11;        // of the size; a sweep extends edges by it
-
-/// m, the farthest motion of a segment end.
-double most_moved(const PosedTool& from, const PosedTool& to, const Vec3& shift) {
-  double most2 = 0;
-  for (std::size_t j = 0; j < to.count; ++j) {
-    const Vec3 start = to.segments[j].start + shift - from.segments[j].start;
-    const Vec3 end = start + to.segments[j].along - from.segments[j].along;
-    most2 = std::max({most2, glm::dot(start, start), glm::dot(end, end)});
-  }
-  return std::sqrt(most2);
-}
-
-/// rad, the largest turn of a segment.
-double most_turned(const PosedTool& from, const PosedTool& to) {
-  double most2 = 0;
-  for (std::size_t j = 0; j < to.count; ++j) {
-    const Vec3 turn = to.segments[j].along - from.segments[j].along;
-    const double length2 = glm::dot(to.segments[j].along, to.segments[j].along);
-    if (length2 > 0) most2 = std::max(most2, glm::dot(turn, turn) / length2);
-  }
-  return std::sqrt(most2);
-}
-
-}  // namespace
 
 /// Finds the first patch that the tool meets while its segment ends move linearly.
 PatchHit SurfaceTool::sweep(const PosedTool& from, const PosedTool& to, const Vec3& shift) const {

@@ -193,8 +193,6 @@ void IdealTool::remember(std::size_t first_contact) {
   remember_ideal_tool(tick_, index_, pose_, at_, !planes_.empty() || stuck_, first_contact);
 }
 
-using Kind = ContactFeature::Kind;
-
 constexpr int kRounds = 96;          // of casts in one tick; then the ideal tool stays where it is
 constexpr double kSlidOff = 4;       // skins; a contact farther off its facet has left it
 constexpr double kOnFacet = 1e-11;   // of the size, added to that for thin skins
@@ -417,8 +415,6 @@ void IdealTool::translate() {
   stuck_ = true;
 }
 
-using Kind = ContactFeature::Kind;
-
 constexpr int kPushRounds = 12;          // to leave parts that a turn brought the tool into
 constexpr double kLeastTurn = 1.0 / 16;  // of a turn; less waits for the next tick
 constexpr double kFarPush = 8;           // times the turn's own motion; a longer push fails
@@ -553,70 +549,6 @@ void show_behind(const UnionMemory& all, bool tool, const Vec3& tip, Rendering& 
   if (tool) out.ideal_side = group.ideal.frame[0];
 }
 
-}  // namespace
-
-Vec3 tail_force(const Vec3& torque, double along, const Vec3& d) {
-  const double length = glm::length(d);
-  if (!(length > 0)) return Vec3(0);
-  const Vec3 u = d / length;
-  return (glm::cross(torque, u) + along * u) / length;
-}
-
-Rendering sum_unions(const UnionTick& tick, const LineProbe& probe) {
-  const UnionMemory& all = tick.state.unions;
-  const bool tool = tick.scene.tool() != nullptr;
-  Rendering out;
-  out.ideal = probe;
-  if (tool) out.ideal_side = tick.tool.frame[0];
-  const PlacedContact* deepest = nullptr;
-  const double length = glm::length(tick.tool.d);
-  double along = 0;  // N m, sum of each contact's lever times its force along the stylus
-  for (const PlacedContact& c : all.contacts) {
-    const Vec3 force =
-        c.loaded.force * c.loaded.contact.normal + c.loaded.stiffness * c.loaded.tangential_offset;
-    out.force += force;
-    if (tick.sides) {
-      const Vec3 lever = c.place + c.loaded.tangential_offset - probe.tip;
-      out.torque += glm::cross(lever, force);
-      if (tool && length > 0)
-        along += glm::dot(lever, tick.tool.d) * glm::dot(force, tick.tool.d) / (length * length);
-      if (!tool) out.device2 += c.loaded.probe_fraction * force;
-    }
-    if (deepest == nullptr || c.loaded.contact.depth > deepest->loaded.contact.depth) deepest = &c;
-  }
-  if (tool && tick.sides) out.device2 = tail_force(out.torque, along, tick.tool.d);
-  out.device1 = out.force - out.device2;
-  out.contacts = static_cast<int>(all.contacts.size());
-  out.faults = tick.faults;
-  if (deepest == nullptr) {
-    show_behind(all, tool, probe.tip, out);
-    return out;
-  }
-  const Vec3 shift = deepest->shift + deepest->loaded.tangential_offset;
-  const GroupState& group = all.groups[deepest->group];
-  out.deepest = deepest->loaded.contact;
-  out.deepest.point = deepest->place + deepest->loaded.tangential_offset;
-  out.object = deepest->loaded.object;
-  out.ideal = {probe.tip + shift, probe.tail + shift};
-  if (deepest->by_law) out.ideal.tail = out.ideal.tip + group.ideal.d;
-  if (tool) {
-    out.segment = deepest->segment;
-    out.ideal_side = group.ideal.frame[0];
-    out.deepest.along =
-        length > 0 ? glm::dot(out.deepest.point - out.ideal.tip, group.ideal.d) / length : 0;
-  } else if (tick.sides) {
-    out.deepest.along = deepest->loaded.probe_fraction * length;
-  }
-  const Vec3 sum = out.force + out.torque + out.device2;
-  if (std::isfinite(sum.x + sum.y + sum.z)) return out;
-  Rendering none;
-  none.ideal = probe;
-  none.faults = tick.faults | render_fault::kNonFinite;
-  return none;
-}
-
-namespace {
-
 /// m, the farthest that any point of the tool moves from one pose to another.
 double motion_of(const ToolPose& from, const PlacedTool& placed_from, const ToolPose& to,
                  const PlacedTool& placed_to) {
@@ -630,8 +562,6 @@ double motion_of(const ToolPose& from, const PlacedTool& placed_from, const Tool
   }
   return most;
 }
-
-}  // namespace
 
 /// The pose at which a tool that comes from free space meets the first part; the virtual pose if it
 /// meets none.
@@ -698,46 +628,6 @@ void IdealTool::follow() {
   add_contacts();
   remember(first_contact);
 }
-
-void remember_ideal_tool(UnionTick& tick, std::uint32_t group, const ToolPose& pose,
-                         const Vec3& shift, bool held, std::size_t first_contact) {
-  UnionMemory& all = tick.state.unions;
-  GroupState& memory = all.groups[group];
-  const Tool* const carried = tick.sides ? tick.scene.tool() : nullptr;
-  // Usually the ideal tool has taken the whole turn.
-  const bool behind = pose.d != tick.tool.d || pose.frame != tick.tool.frame;
-  const double angle = behind ? angle_between(carried, pose, tick.tool) : 0;
-  memory.touching = held || angle > 0 || shift != Vec3(0);
-  memory.ideal = pose;
-  memory.ideal.tip = tick.tool.tip + shift;
-  memory.lag = angle;
-  if (angle > all.most_lag) {
-    all.most_lag = angle;
-    all.most_behind = group;
-  }
-  all.exceptions |= angle > kMostLag;
-  const double size = carried != nullptr ? tick.scene.tool_reach() : glm::length(pose.d);
-  all.reach = std::max(all.reach, glm::length(shift) + angle * size);
-  Vec3 grasp(0);
-  double weight = 0;
-  for (std::size_t i = first_contact; i < all.contacts.size(); ++i) {
-    const PlacedContact& c = all.contacts[i];
-    const double share = c.loaded.normal_displacement;
-    weight += share;
-    grasp += share * (carried != nullptr
-                          ? glm::transpose(pose.frame) * (c.place - c.shift - tick.tool.tip)
-                          : Vec3(0, 0, c.loaded.probe_fraction));
-  }
-  if (weight > 0) memory.grasp = grasp / weight;
-}
-
-void follow_ideal_tool(UnionTick& tick, std::uint32_t group) { IdealTool(tick, group).follow(); }
-
-bool inside_group(UnionTick& tick, std::uint32_t group) {
-  return NearPairs(tick, tick.scene.groups()[group]).virtual_inside();
-}
-
-namespace {
 
 /// Forgets the contacts with the k-th part of a group.
 void forget_part(UnionTick& tick, const PartGroup& group, std::size_t k) {
@@ -877,6 +767,104 @@ void break_layers(UnionTick& tick) {
 }
 
 }  // namespace
+
+Vec3 tail_force(const Vec3& torque, double along, const Vec3& d) {
+  const double length = glm::length(d);
+  if (!(length > 0)) return Vec3(0);
+  const Vec3 u = d / length;
+  return (glm::cross(torque, u) + along * u) / length;
+}
+
+Rendering sum_unions(const UnionTick& tick, const LineProbe& probe) {
+  const UnionMemory& all = tick.state.unions;
+  const bool tool = tick.scene.tool() != nullptr;
+  Rendering out;
+  out.ideal = probe;
+  if (tool) out.ideal_side = tick.tool.frame[0];
+  const PlacedContact* deepest = nullptr;
+  const double length = glm::length(tick.tool.d);
+  double along = 0;  // N m, sum of each contact's lever times its force along the stylus
+  for (const PlacedContact& c : all.contacts) {
+    const Vec3 force =
+        c.loaded.force * c.loaded.contact.normal + c.loaded.stiffness * c.loaded.tangential_offset;
+    out.force += force;
+    if (tick.sides) {
+      const Vec3 lever = c.place + c.loaded.tangential_offset - probe.tip;
+      out.torque += glm::cross(lever, force);
+      if (tool && length > 0)
+        along += glm::dot(lever, tick.tool.d) * glm::dot(force, tick.tool.d) / (length * length);
+      if (!tool) out.device2 += c.loaded.probe_fraction * force;
+    }
+    if (deepest == nullptr || c.loaded.contact.depth > deepest->loaded.contact.depth) deepest = &c;
+  }
+  if (tool && tick.sides) out.device2 = tail_force(out.torque, along, tick.tool.d);
+  out.device1 = out.force - out.device2;
+  out.contacts = static_cast<int>(all.contacts.size());
+  out.faults = tick.faults;
+  if (deepest == nullptr) {
+    show_behind(all, tool, probe.tip, out);
+    return out;
+  }
+  const Vec3 shift = deepest->shift + deepest->loaded.tangential_offset;
+  const GroupState& group = all.groups[deepest->group];
+  out.deepest = deepest->loaded.contact;
+  out.deepest.point = deepest->place + deepest->loaded.tangential_offset;
+  out.object = deepest->loaded.object;
+  out.ideal = {probe.tip + shift, probe.tail + shift};
+  if (deepest->by_law) out.ideal.tail = out.ideal.tip + group.ideal.d;
+  if (tool) {
+    out.segment = deepest->segment;
+    out.ideal_side = group.ideal.frame[0];
+    out.deepest.along =
+        length > 0 ? glm::dot(out.deepest.point - out.ideal.tip, group.ideal.d) / length : 0;
+  } else if (tick.sides) {
+    out.deepest.along = deepest->loaded.probe_fraction * length;
+  }
+  const Vec3 sum = out.force + out.torque + out.device2;
+  if (std::isfinite(sum.x + sum.y + sum.z)) return out;
+  Rendering none;
+  none.ideal = probe;
+  none.faults = tick.faults | render_fault::kNonFinite;
+  return none;
+}
+
+void remember_ideal_tool(UnionTick& tick, std::uint32_t group, const ToolPose& pose,
+                         const Vec3& shift, bool held, std::size_t first_contact) {
+  UnionMemory& all = tick.state.unions;
+  GroupState& memory = all.groups[group];
+  const Tool* const carried = tick.sides ? tick.scene.tool() : nullptr;
+  // Usually the ideal tool has taken the whole turn.
+  const bool behind = pose.d != tick.tool.d || pose.frame != tick.tool.frame;
+  const double angle = behind ? angle_between(carried, pose, tick.tool) : 0;
+  memory.touching = held || angle > 0 || shift != Vec3(0);
+  memory.ideal = pose;
+  memory.ideal.tip = tick.tool.tip + shift;
+  memory.lag = angle;
+  if (angle > all.most_lag) {
+    all.most_lag = angle;
+    all.most_behind = group;
+  }
+  all.exceptions |= angle > kMostLag;
+  const double size = carried != nullptr ? tick.scene.tool_reach() : glm::length(pose.d);
+  all.reach = std::max(all.reach, glm::length(shift) + angle * size);
+  Vec3 grasp(0);
+  double weight = 0;
+  for (std::size_t i = first_contact; i < all.contacts.size(); ++i) {
+    const PlacedContact& c = all.contacts[i];
+    const double share = c.loaded.normal_displacement;
+    weight += share;
+    grasp += share * (carried != nullptr
+                          ? glm::transpose(pose.frame) * (c.place - c.shift - tick.tool.tip)
+                          : Vec3(0, 0, c.loaded.probe_fraction));
+  }
+  if (weight > 0) memory.grasp = grasp / weight;
+}
+
+void follow_ideal_tool(UnionTick& tick, std::uint32_t group) { IdealTool(tick, group).follow(); }
+
+bool inside_group(UnionTick& tick, std::uint32_t group) {
+  return NearPairs(tick, tick.scene.groups()[group]).virtual_inside();
+}
 
 bool is_off(const UnionTick& tick, const PartGroup& group) {
   const ObjectState& object = tick.state.unions.objects[group.object_state];

@@ -536,18 +536,6 @@ class Cleaner {
   double size_ = 0;   // m, diagonal of the bounding box
   double error_ = 0;  // m, of a coordinate
 };
-
-}  // namespace
-
-CleanedSurface closed_surface(const PolygonSoup& soup) {
-  CleanedSurface cleaned = Cleaner(soup).run();
-  cleaned.surface.coordinate_error = soup.coordinate_error;
-  return cleaned;
-}
-
-namespace {
-
-using Index = std::uint32_t;
 constexpr Index kNone = 0xffffffff;
 
 std::uint64_t hash_of(const Vec3& point) {
@@ -566,6 +554,12 @@ Index kept_for(std::vector<Index>& kept, Index i) {
 }
 
 }  // namespace
+
+CleanedSurface closed_surface(const PolygonSoup& soup) {
+  CleanedSurface cleaned = Cleaner(soup).run();
+  cleaned.surface.coordinate_error = soup.coordinate_error;
+  return cleaned;
+}
 
 std::vector<Index> weld_equal(const std::vector<Vec3>& points) {
   std::vector<Index> slots(std::bit_ceil(2 * points.size() + 16), kNone);

@@ -14,6 +14,8 @@ namespace {
 
 using Index = HalfEdges::Index;
 
+using Index = std::uint32_t;
+
 PolygonExtent extent_of(const HalfEdges& mesh, Index h) {
   const Index face = mesh.face[h], corners = mesh.first[face + 1] - mesh.first[face];
   // A sample of the corners of a large polygon is enough: all would cost their number squared.
@@ -135,89 +137,6 @@ void renumber(std::vector<Index>& region_of, Index& count) {
   }
 }
 
-}  // namespace
-
-std::vector<FaceShape> shapes_of(const HalfEdges& mesh) {
-  std::vector<FaceShape> shapes(mesh.face_count());
-  std::vector<Vec3> corners;
-  for (Index f = 0; f < mesh.face_count(); ++f) {
-    corners.clear();
-    for (Index h = mesh.first[f]; h < mesh.first[f + 1]; ++h) corners.push_back(mesh.from(h));
-    const PolygonPlane plane = plane_of(corners);
-    const double height = 2 * plane.area / plane.diameter;
-    shapes[f] = {plane.area, plane.normal, plane.middle, !(height > 4 * mesh.error)};
-  }
-  return shapes;
-}
-
-void check_flatness(const HalfEdges& mesh, const std::vector<FaceShape>& shapes,
-                    MeshFaults& faults) {
-  for (Index f = 0; f < mesh.face_count(); ++f) {
-    if (mesh.first[f + 1] - mesh.first[f] == 3 || shapes[f].thin) continue;
-    double off = 0;
-    for (Index h = mesh.first[f]; h < mesh.first[f + 1]; ++h) {
-      off = std::max(off, std::abs(glm::dot(shapes[f].normal, mesh.from(h) - shapes[f].middle)));
-    }
-    if (off <= 2 * kCoplanar * mesh.error) continue;
-    faults.add("bent face", [&] {
-      return mesh.name_face(f) + ": expected corners in one plane, found them up to " +
-             std::to_string(off / mesh.size) + " of the object's size off it";
-    });
-  }
-}
-
-double plane_deviation_at(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, Index h) {
-  const Index twin = mesh.twin[h];
-  return plane_deviation(shapes[mesh.face[h]].normal, shapes[mesh.face[twin]].normal,
-                         mesh.to(h) - mesh.from(h), extent_of(mesh, h), extent_of(mesh, twin),
-                         mesh.error);
-}
-
-std::vector<Index> coplanar_regions(const HalfEdges& mesh, const std::vector<FaceShape>& shapes,
-                                    Index& count) {
-  // The largest faces first: their planes are known best.
-  std::vector<std::pair<double, Index>> seeds;
-  std::vector<Index> thin;
-  for (Index f = 0; f < mesh.face_count(); ++f) {
-    if (shapes[f].thin) {
-      thin.push_back(f);
-    } else {
-      seeds.emplace_back(-shapes[f].area, f);
-    }
-  }
-  std::sort(seeds.begin(), seeds.end());
-  std::vector<Index> region_of(mesh.face_count(), HalfEdges::kNone);
-  count = 0;
-  for (const auto& [area, face] : seeds) {
-    if (region_of[face] == HalfEdges::kNone) grow(mesh, shapes, face, count++, region_of);
-  }
-  if (count == 0) return region_of;
-  assign_thin_faces(mesh, std::move(thin), region_of);
-  renumber(region_of, count);
-  return region_of;
-}
-
-std::vector<Index> single_regions(const HalfEdges& mesh, const std::vector<FaceShape>& shapes,
-                                  Index& count) {
-  std::vector<Index> region_of(mesh.face_count(), HalfEdges::kNone), thin;
-  count = 0;
-  for (Index f = 0; f < mesh.face_count(); ++f) {
-    if (shapes[f].thin) {
-      thin.push_back(f);
-    } else {
-      region_of[f] = count++;
-    }
-  }
-  if (count == 0) return region_of;
-  assign_thin_faces(mesh, std::move(thin), region_of);
-  renumber(region_of, count);
-  return region_of;
-}
-
-namespace {
-
-using Index = HalfEdges::Index;
-
 class Outliner {
  public:
   Outliner(const HalfEdges& mesh, const std::vector<Index>& region_of, Index region_count)
@@ -307,17 +226,6 @@ class Outliner {
   FacetOutlines outlines_;
 };
 
-}  // namespace
-
-FacetOutlines facet_outlines(const HalfEdges& mesh, const std::vector<Index>& region_of,
-                             Index region_count, MeshFaults& faults) {
-  return Outliner(mesh, region_of, region_count).outlines(faults);
-}
-
-namespace {
-
-using Index = std::uint32_t;
-
 /// A side of one of several triangles at an edge.
 struct Turned {
   double angle;  // about the edge
@@ -369,6 +277,88 @@ void link_fan(const std::vector<Vec3>& vertices, const std::vector<std::array<In
 }
 
 }  // namespace
+
+std::vector<FaceShape> shapes_of(const HalfEdges& mesh) {
+  std::vector<FaceShape> shapes(mesh.face_count());
+  std::vector<Vec3> corners;
+  for (Index f = 0; f < mesh.face_count(); ++f) {
+    corners.clear();
+    for (Index h = mesh.first[f]; h < mesh.first[f + 1]; ++h) corners.push_back(mesh.from(h));
+    const PolygonPlane plane = plane_of(corners);
+    const double height = 2 * plane.area / plane.diameter;
+    shapes[f] = {plane.area, plane.normal, plane.middle, !(height > 4 * mesh.error)};
+  }
+  return shapes;
+}
+
+void check_flatness(const HalfEdges& mesh, const std::vector<FaceShape>& shapes,
+                    MeshFaults& faults) {
+  for (Index f = 0; f < mesh.face_count(); ++f) {
+    if (mesh.first[f + 1] - mesh.first[f] == 3 || shapes[f].thin) continue;
+    double off = 0;
+    for (Index h = mesh.first[f]; h < mesh.first[f + 1]; ++h) {
+      off = std::max(off, std::abs(glm::dot(shapes[f].normal, mesh.from(h) - shapes[f].middle)));
+    }
+    if (off <= 2 * kCoplanar * mesh.error) continue;
+    faults.add("bent face", [&] {
+      return mesh.name_face(f) + ": expected corners in one plane, found them up to " +
+             std::to_string(off / mesh.size) + " of the object's size off it";
+    });
+  }
+}
+
+double plane_deviation_at(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, Index h) {
+  const Index twin = mesh.twin[h];
+  return plane_deviation(shapes[mesh.face[h]].normal, shapes[mesh.face[twin]].normal,
+                         mesh.to(h) - mesh.from(h), extent_of(mesh, h), extent_of(mesh, twin),
+                         mesh.error);
+}
+
+std::vector<Index> coplanar_regions(const HalfEdges& mesh, const std::vector<FaceShape>& shapes,
+                                    Index& count) {
+  // The largest faces first: their planes are known best.
+  std::vector<std::pair<double, Index>> seeds;
+  std::vector<Index> thin;
+  for (Index f = 0; f < mesh.face_count(); ++f) {
+    if (shapes[f].thin) {
+      thin.push_back(f);
+    } else {
+      seeds.emplace_back(-shapes[f].area, f);
+    }
+  }
+  std::sort(seeds.begin(), seeds.end());
+  std::vector<Index> region_of(mesh.face_count(), HalfEdges::kNone);
+  count = 0;
+  for (const auto& [area, face] : seeds) {
+    if (region_of[face] == HalfEdges::kNone) grow(mesh, shapes, face, count++, region_of);
+  }
+  if (count == 0) return region_of;
+  assign_thin_faces(mesh, std::move(thin), region_of);
+  renumber(region_of, count);
+  return region_of;
+}
+
+std::vector<Index> single_regions(const HalfEdges& mesh, const std::vector<FaceShape>& shapes,
+                                  Index& count) {
+  std::vector<Index> region_of(mesh.face_count(), HalfEdges::kNone), thin;
+  count = 0;
+  for (Index f = 0; f < mesh.face_count(); ++f) {
+    if (shapes[f].thin) {
+      thin.push_back(f);
+    } else {
+      region_of[f] = count++;
+    }
+  }
+  if (count == 0) return region_of;
+  assign_thin_faces(mesh, std::move(thin), region_of);
+  renumber(region_of, count);
+  return region_of;
+}
+
+FacetOutlines facet_outlines(const HalfEdges& mesh, const std::vector<Index>& region_of,
+                             Index region_count, MeshFaults& faults) {
+  return Outliner(mesh, region_of, region_count).outlines(faults);
+}
 
 SideGroups::SideGroups(std::size_t vertex_count, const std::vector<std::array<Index, 3>>& triangles)
     : first_(vertex_count + 1, 0), sides_(3 * triangles.size()) {

@@ -26,36 +26,6 @@ Vec3 farthest_from(const Vec3& point, std::span<const Vec3> corners) {
   return farthest;
 }
 
-}  // namespace
-
-PolygonPlane plane_of(std::span<const Vec3> corners) {
-  PolygonPlane plane;
-  for (const Vec3& corner : corners) plane.middle += corner - corners[0];
-  plane.middle = corners[0] + plane.middle / static_cast<double>(corners.size());
-  // Newell's method, about the middle.
-  Vec3 twice_area;
-  for (std::size_t k = 0; k < corners.size(); ++k) {
-    const std::size_t next = k + 1 == corners.size() ? 0 : k + 1;
-    twice_area += glm::cross(corners[k] - plane.middle, corners[next] - plane.middle);
-  }
-  // In a long and narrow polygon the products are large compared with their sum, and rounding tilts
-  // the normal along the length, where it matters most: the far end of a needle would stand out.
-  // The direction of the length is known well, so that component is removed.
-  const Vec3 end = farthest_from(plane.middle, corners);
-  const Vec3 chord = farthest_from(end, corners) - end;
-  plane.diameter = glm::length(chord);
-  if (plane.diameter > 0) {
-    const Vec3 along = chord / plane.diameter;
-    twice_area -= glm::dot(twice_area, along) * along;
-  }
-  const double length = glm::length(twice_area);
-  plane.area = length / 2;
-  if (length > 0) plane.normal = twice_area / length;
-  return plane;
-}
-
-namespace {
-
 using Index = std::uint32_t;
 using Triangle = std::array<Index, 3>;
 constexpr Index kGone = 0xffffffff;
@@ -257,19 +227,7 @@ class Flattening {
   Flattened result_;
   bool last_resort_ = false;
 };
-
-}  // namespace
-
-Flattened collapse_flat_triangles(const std::vector<Vec3>& points, std::vector<Triangle>& triangles,
-                                  std::vector<Triangle>& across, double tolerance) {
-  return Flattening(points, triangles, across, tolerance).run();
-}
-
-namespace {
-
-using Index = std::uint32_t;
 using Vec2 = glm::dvec2;
-using Triangle = std::array<Index, 3>;
 
 double turn_of(const Vec2& a, const Vec2& b, const Vec2& c) {
   return (b.x - a.x) * (c.y - b.y) - (b.y - a.y) * (c.x - b.x);
@@ -424,6 +382,37 @@ std::vector<Vec2> seen_along(const Vec3& normal, std::span<const Vec3> corners) 
 }
 
 }  // namespace
+
+PolygonPlane plane_of(std::span<const Vec3> corners) {
+  PolygonPlane plane;
+  for (const Vec3& corner : corners) plane.middle += corner - corners[0];
+  plane.middle = corners[0] + plane.middle / static_cast<double>(corners.size());
+  // Newell's method, about the middle.
+  Vec3 twice_area;
+  for (std::size_t k = 0; k < corners.size(); ++k) {
+    const std::size_t next = k + 1 == corners.size() ? 0 : k + 1;
+    twice_area += glm::cross(corners[k] - plane.middle, corners[next] - plane.middle);
+  }
+  // In a long and narrow polygon the products are large compared with their sum, and rounding tilts
+  // the normal along the length, where it matters most: the far end of a needle would stand out.
+  // The direction of the length is known well, so that component is removed.
+  const Vec3 end = farthest_from(plane.middle, corners);
+  const Vec3 chord = farthest_from(end, corners) - end;
+  plane.diameter = glm::length(chord);
+  if (plane.diameter > 0) {
+    const Vec3 along = chord / plane.diameter;
+    twice_area -= glm::dot(twice_area, along) * along;
+  }
+  const double length = glm::length(twice_area);
+  plane.area = length / 2;
+  if (length > 0) plane.normal = twice_area / length;
+  return plane;
+}
+
+Flattened collapse_flat_triangles(const std::vector<Vec3>& points, std::vector<Triangle>& triangles,
+                                  std::vector<Triangle>& across, double tolerance) {
+  return Flattening(points, triangles, across, tolerance).run();
+}
 
 std::vector<Triangle> face_triangles(std::span<const Vec3> corners) {
   if (corners.size() == 3) return {{0, 1, 2}};

@@ -22,6 +22,7 @@
 #include "stimuli/vec.h"
 
 namespace palpate::stimuli {
+namespace {
 
 // A glTF document: its JSON, each value with its place, and the data of a .glb.
 
@@ -30,6 +31,8 @@ struct GltfRefused {
   std::string place;  ///< a JSON pointer, a line or a byte; empty: the file
   std::string expected, found;
 };
+
+using nlohmann::json;
 
 /// A value of the document, or none, and its place. Every read is checked: GltfRefused says what
 /// was expected there and what was found.
@@ -119,10 +122,6 @@ class GltfAccessors {
   std::vector<std::string> buffers_;
 };
 
-namespace {
-
-using nlohmann::json;
-
 constexpr std::uint32_t kMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
 constexpr std::size_t kFileHeader = 12, kChunkFileHeader = 8;
 
@@ -176,8 +175,6 @@ void require_known(const GltfValue& extension) {
   }
   extension.refuse("a file that needs no extension but KHR_mesh_quantization and those of looks");
 }
-
-}  // namespace
 
 void GltfValue::refuse(const std::string& expected) const {
   throw GltfRefused{place_, expected, found_text(value_)};
@@ -299,8 +296,6 @@ std::string_view GltfDocument::take_chunks(std::string_view bytes) {
   return *text;
 }
 
-namespace {
-
 /// A number of an accessor by its componentType (glTF 2.0, 3.6.2.2).
 struct Component {
   std::size_t type, bytes;
@@ -371,8 +366,6 @@ class PositionNumber {
   bool is_normalised_;
   std::optional<Component> integer_;  ///< none: single precision
 };
-
-}  // namespace
 
 GltfAccessors::GltfAccessors(const GltfDocument& document, std::size_t most)
     : document_(document), most_(most) {
@@ -514,11 +507,6 @@ std::vector<std::uint32_t> GltfAccessors::indices(const GltfValue& number,
   }
   return corners;
 }
-
-// glTF 2.0 (Khronos 2021; .gltf and .glb): triangles of the default scene's nodes, each primitive a
-// group. Materials, skins and animations do not describe the solid.
-
-namespace {
 
 using Matrix = glm::dmat4;
 using Triangle = std::array<std::uint32_t, 3>;
@@ -758,6 +746,9 @@ class GltfReader {
 };
 
 }  // namespace
+
+// glTF 2.0 (Khronos 2021; .gltf and .glb): triangles of the default scene's nodes, each primitive a
+// group. Materials, skins and animations do not describe the solid.
 
 PolygonSoup read_gltf(std::string_view bytes, FileFaults& faults) {
   try {

@@ -86,6 +86,98 @@ PolygonSoup icosahedron() {
            {3, 8, 9},   {4, 9, 5},  {2, 4, 11}, {6, 2, 10}, {8, 6, 7},   {9, 8, 1}}};
 }
 
+/// m, of any coordinate: poses farther away are no hand's, and the renderers take them for faults.
+constexpr double kFarthestCorner = 1e6;
+
+void check_reach(const PolygonSoup& soup, const std::string& file) {
+  MeshFaults faults;
+  for (std::size_t v = 0; v < soup.vertices.size(); ++v) {
+    const Vec3& at = soup.vertices[v];
+    if (std::max({std::abs(at.x), std::abs(at.y), std::abs(at.z)}) <= kFarthestCorner) continue;
+    faults.add("too far", [&] {
+      char text[120];
+      std::snprintf(text, sizeof text, "(%.6g, %.6g, %.6g)", at.x, at.y, at.z);
+      return file + ": " + MeshNaming(soup.names).vertex(static_cast<Index>(v), at) +
+             ": expected coordinates in metres, up to 1e6 from the origin, found " + text;
+    });
+  }
+  faults.throw_if_any();
+}
+
+double sign_of(double value) { return value < 0 ? -1 : 1; }
+
+SurfaceDistance to_sphere(double radius, const Vec3& point) {
+  const double from_centre = glm::length(point);
+  return {from_centre - radius, from_centre > 0 ? point / from_centre : Vec3(0, 0, 1)};
+}
+
+SurfaceDistance to_box(const Vec3& size, const Vec3& point) {
+  const Vec3 sign(sign_of(point.x), sign_of(point.y), sign_of(point.z));
+  const Vec3 beyond = glm::abs(point) - 0.5 * size;
+  const Vec3 outside = glm::max(beyond, Vec3(0));
+  const double distance = glm::length(outside);
+  if (distance > 0) return {distance, sign * (outside / distance)};
+  int nearest = 0;
+  for (int axis = 1; axis < 3; ++axis) {
+    if (beyond[axis] > beyond[nearest]) nearest = axis;
+  }
+  Vec3 normal;
+  normal[nearest] = sign[nearest];
+  return {beyond[nearest], normal};
+}
+
+// A vector in the half plane of a solid of revolution: away from the axis, and along it.
+struct Profile {
+  double distance, out, up;
+};
+
+SurfaceDistance revolved(const Profile& profile, const Vec3& point, double from_axis) {
+  const double x = from_axis > 0 ? point.x / from_axis : 1;
+  const double y = from_axis > 0 ? point.y / from_axis : 0;
+  return {profile.distance, Vec3(profile.out * x, profile.out * y, profile.up)};
+}
+
+Profile to_corner(double out, double up) {
+  const double distance = std::hypot(out, up);
+  return {distance, out / distance, up / distance};
+}
+
+Profile to_cylinder(double radius, double height, double from_axis, double z) {
+  const double side = from_axis - radius, end = std::abs(z) - height / 2;
+  if (side > 0 && end > 0) return to_corner(side, end * sign_of(z));
+  if (side >= end) return {side, 1, 0};
+  return {end, 0, sign_of(z)};
+}
+
+Profile to_cone(double radius, double height, double from_axis, double z) {
+  const double slant = std::hypot(radius, height);
+  const double below_apex = height / 2 - z;
+  const double side = (height * from_axis - radius * below_apex) / slant;
+  const double down_the_side = (radius * from_axis + height * below_apex) / slant;
+  const double base = -height / 2 - z;
+  const Profile to_side{side, height / slant, radius / slant}, to_base{base, 0, -1};
+  if (side <= 0 && base <= 0) return side >= base ? to_side : to_base;
+  if (down_the_side <= 0) return to_corner(from_axis, -below_apex);
+  if (down_the_side < slant && side > 0) return to_side;
+  if (from_axis <= radius) return to_base;
+  return to_corner(from_axis - radius, -base);
+}
+
+bool above_polygon(const ConvexMesh& mesh, const Facet& facet, const Vec3& point) {
+  for (std::uint32_t s = facet.first_side; s < facet.first_side + facet.side_count; ++s) {
+    const Side& side = mesh.sides()[s];
+    if (glm::dot(side.inward, point) < side.offset) return false;
+  }
+  return true;
+}
+
+Vec3 nearest_on(const Edge& edge, const Vec3& point) {
+  const Vec3& from = edge.from;
+  const Vec3 along = edge.to - from;
+  const double fraction = glm::dot(point - from, along) / glm::dot(along, along);
+  return from + std::clamp(fraction, 0.0, 1.0) * along;
+}
+
 }  // namespace
 
 PolygonSoup icosphere(double radius, int subdivisions) {
@@ -168,28 +260,6 @@ PolygonSoup box(const Vec3& size) {
           {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4}, {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}}};
 }
 
-namespace {
-
-/// m, of any coordinate: poses farther away are no hand's, and the renderers take them for faults.
-constexpr double kFarthestCorner = 1e6;
-
-void check_reach(const PolygonSoup& soup, const std::string& file) {
-  MeshFaults faults;
-  for (std::size_t v = 0; v < soup.vertices.size(); ++v) {
-    const Vec3& at = soup.vertices[v];
-    if (std::max({std::abs(at.x), std::abs(at.y), std::abs(at.z)}) <= kFarthestCorner) continue;
-    faults.add("too far", [&] {
-      char text[120];
-      std::snprintf(text, sizeof text, "(%.6g, %.6g, %.6g)", at.x, at.y, at.z);
-      return file + ": " + MeshNaming(soup.names).vertex(static_cast<Index>(v), at) +
-             ": expected coordinates in metres, up to 1e6 from the origin, found " + text;
-    });
-  }
-  faults.throw_if_any();
-}
-
-}  // namespace
-
 PolygonSoup polygons_of(const ObjectSpec& spec) {
   switch (spec.shape) {
     case ShapeKind::sphere:
@@ -217,84 +287,6 @@ PolygonSoup polygons_of(const ObjectSpec& spec) {
   }
   throw std::invalid_argument("a compound has no polygons of its own: ask for those of its parts");
 }
-
-namespace {
-
-double sign_of(double value) { return value < 0 ? -1 : 1; }
-
-SurfaceDistance to_sphere(double radius, const Vec3& point) {
-  const double from_centre = glm::length(point);
-  return {from_centre - radius, from_centre > 0 ? point / from_centre : Vec3(0, 0, 1)};
-}
-
-SurfaceDistance to_box(const Vec3& size, const Vec3& point) {
-  const Vec3 sign(sign_of(point.x), sign_of(point.y), sign_of(point.z));
-  const Vec3 beyond = glm::abs(point) - 0.5 * size;
-  const Vec3 outside = glm::max(beyond, Vec3(0));
-  const double distance = glm::length(outside);
-  if (distance > 0) return {distance, sign * (outside / distance)};
-  int nearest = 0;
-  for (int axis = 1; axis < 3; ++axis) {
-    if (beyond[axis] > beyond[nearest]) nearest = axis;
-  }
-  Vec3 normal;
-  normal[nearest] = sign[nearest];
-  return {beyond[nearest], normal};
-}
-
-// A vector in the half plane of a solid of revolution: away from the axis, and along it.
-struct Profile {
-  double distance, out, up;
-};
-
-SurfaceDistance revolved(const Profile& profile, const Vec3& point, double from_axis) {
-  const double x = from_axis > 0 ? point.x / from_axis : 1;
-  const double y = from_axis > 0 ? point.y / from_axis : 0;
-  return {profile.distance, Vec3(profile.out * x, profile.out * y, profile.up)};
-}
-
-Profile to_corner(double out, double up) {
-  const double distance = std::hypot(out, up);
-  return {distance, out / distance, up / distance};
-}
-
-Profile to_cylinder(double radius, double height, double from_axis, double z) {
-  const double side = from_axis - radius, end = std::abs(z) - height / 2;
-  if (side > 0 && end > 0) return to_corner(side, end * sign_of(z));
-  if (side >= end) return {side, 1, 0};
-  return {end, 0, sign_of(z)};
-}
-
-Profile to_cone(double radius, double height, double from_axis, double z) {
-  const double slant = std::hypot(radius, height);
-  const double below_apex = height / 2 - z;
-  const double side = (height * from_axis - radius * below_apex) / slant;
-  const double down_the_side = (radius * from_axis + height * below_apex) / slant;
-  const double base = -height / 2 - z;
-  const Profile to_side{side, height / slant, radius / slant}, to_base{base, 0, -1};
-  if (side <= 0 && base <= 0) return side >= base ? to_side : to_base;
-  if (down_the_side <= 0) return to_corner(from_axis, -below_apex);
-  if (down_the_side < slant && side > 0) return to_side;
-  if (from_axis <= radius) return to_base;
-  return to_corner(from_axis - radius, -base);
-}
-
-bool above_polygon(const ConvexMesh& mesh, const Facet& facet, const Vec3& point) {
-  for (std::uint32_t s = facet.first_side; s < facet.first_side + facet.side_count; ++s) {
-    const Side& side = mesh.sides()[s];
-    if (glm::dot(side.inward, point) < side.offset) return false;
-  }
-  return true;
-}
-
-Vec3 nearest_on(const Edge& edge, const Vec3& point) {
-  const Vec3& from = edge.from;
-  const Vec3 along = edge.to - from;
-  const double fraction = glm::dot(point - from, along) / glm::dot(along, along);
-  return from + std::clamp(fraction, 0.0, 1.0) * along;
-}
-
-}  // namespace
 
 SurfaceDistance signed_distance(const ObjectSpec& primitive, const Vec3& point) {
   const double from_axis = std::hypot(point.x, point.y);

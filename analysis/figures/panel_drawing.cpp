@@ -14,7 +14,6 @@
 #include "analysis/text.h"
 
 namespace palpate::analysis {
-
 namespace {
 
 /// Distance of ticks: 1, 2 or 5 times a power of ten, near a fifth of `span`.
@@ -35,6 +34,248 @@ std::string log_tick_text(int factor, int exponent) {
   text += exponent < 0 ? "10⁻" : "10";
   for (const char digit : std::to_string(std::abs(exponent))) text += kRaised[digit - '0'];
   return text;
+}
+
+constexpr double kPoint = 7;               // px: half the width of a point and its margin
+constexpr double kBeside = 11;             // px from the point to its label
+constexpr double kLeft = 12, kRight = 12;  // px beside the panel that a label may take
+
+/// Axis-aligned rectangle in px from the panel's upper left corner, y down.
+struct Box {
+  double left, right, top, bottom;
+
+  bool meets(const Box& other) const {
+    return left < other.right && other.left < right && top < other.bottom && other.top < bottom;
+  }
+};
+
+class Placement {
+ public:
+  Placement(const Panel& panel, double width) : panel_(panel), width_(width) {
+    for (const Mark& mark : panel.marks) {
+      if (mark.kind == Mark::Kind::line) {
+        for (std::size_t i = 1; i < mark.x.size(); ++i) {
+          take_segment(mark.x[i - 1], mark.y[i - 1], mark.x[i], mark.y[i]);
+        }
+      } else if (mark.kind == Mark::Kind::interval) {
+        take_segment(mark.x[0], mark.y[0], mark.x[0], mark.y[1]);
+      } else if (mark.kind == Mark::Kind::label) {
+        const double px = x(mark.x[0]), py = y(mark.y[0]);
+        taken_.push_back({px - kPoint, px + kPoint, py - kPoint, py + kPoint});
+      }
+    }
+  }
+
+  /// Chooses the candidate position with the fewest overlaps and marks it as taken.
+  Mark put(const Mark& label) {
+    Mark best;
+    Box best_box{};
+    std::ptrdiff_t fewest = std::ssize(taken_) + 4;
+    for (const double dy : {4.0, -10.0, 19.0, -26.0, 35.0, -44.0, 53.0, -62.0, 71.0}) {
+      for (const int anchor : {-1, 1}) {
+        Mark text = label;
+        text.kind = Mark::Kind::text;
+        text.anchor = anchor;
+        text.dx = -kBeside * anchor;
+        text.dy = dy;
+        const Box box = box_of(text);
+        const std::ptrdiff_t hidden = n_hidden(box);
+        if (hidden >= fewest) continue;
+        fewest = hidden;
+        best = std::move(text);
+        best_box = box;
+      }
+    }
+    taken_.push_back(best_box);
+    return best;
+  }
+
+ private:
+  void take_segment(double x0, double y0, double x1, double y1) {
+    constexpr int kPieces = 4;  // of an oblique segment, as one bounding box would cover too much
+    const int pieces = x0 == x1 || y0 == y1 ? 1 : kPieces;
+    for (int i = 0; i < pieces; ++i) {
+      const double from = static_cast<double>(i) / pieces, to = static_cast<double>(i + 1) / pieces;
+      const auto [left, right] =
+          std::minmax({x(std::lerp(x0, x1, from)), x(std::lerp(x0, x1, to))});
+      const auto [top, bottom] =
+          std::minmax({y(std::lerp(y0, y1, from)), y(std::lerp(y0, y1, to))});
+      taken_.push_back({left - 2, right + 2, top - 2, bottom + 2});
+    }
+  }
+
+  double x(double value) const {
+    return (value - panel_.x.low) / (panel_.x.high - panel_.x.low) * width_;
+  }
+  double y(double value) const {
+    return (panel_.y.high - value) / (panel_.y.high - panel_.y.low) * panel_.height;
+  }
+
+  Box box_of(const Mark& text) const {
+    const double wide = text_width(text.text, text.size, text.bold);
+    const double left = x(text.x[0]) + text.dx - (text.anchor > 0 ? wide : 0);
+    const double base = y(text.y[0]) + text.dy;
+    return {left, left + wide, base - text.size, base + 3};
+  }
+
+  /// Number of overlaps of a box; extending beyond the panel counts as three.
+  std::ptrdiff_t n_hidden(const Box& box) const {
+    const bool outside = box.left < -kLeft || box.right > width_ + kRight;
+    return std::ranges::count_if(taken_, [&](const Box& other) { return box.meets(other); }) +
+           (outside ? 3 : 0);
+  }
+
+  const Panel& panel_;
+  double width_;
+  std::vector<Box> taken_;  ///< points, intervals, lines, then labels placed so far
+};
+
+constexpr std::size_t kLongestName = 18;  // characters of a name beside an axis
+constexpr double kTickSize = 12, kNameSize = 13, kLineHeight = 15;  // px
+
+const std::string& colour(const Palette& palette, Role role) {
+  return palette[static_cast<std::size_t>(role)];
+}
+
+std::string tick_text(const Tick& tick) { return shortened(tick.label, kLongestName); }
+
+/// The labelled ticks: every `every`-th from `first` on, as many as fit without overlap; the tick
+/// at 0 is labelled.
+struct LabelStride {
+  std::size_t every = 1, first = 0;
+  bool has_label(std::size_t tick) const { return tick % every == first; }
+};
+
+/// \param at px of each tick along the axis \param lengths px of each label along the axis
+LabelStride label_stride(const FigureAxis& axis, const std::vector<double>& at,
+                         const std::vector<double>& lengths) {
+  const std::size_t n = axis.ticks.size();
+  const auto zero = static_cast<std::size_t>(
+      std::ranges::find_if(axis.ticks, [](const Tick& tick) { return tick.at == 0; }) -
+      axis.ticks.begin());
+  LabelStride stride;
+  for (; stride.every < n; ++stride.every) {
+    stride.first = zero < n ? zero % stride.every : 0;
+    bool apart = true;
+    for (std::size_t i = stride.first; i + stride.every < n; i += stride.every) {
+      const std::size_t next = i + stride.every;
+      apart = apart && std::fabs(at[next] - at[i]) >= (lengths[i] + lengths[next]) / 2;
+    }
+    if (apart) break;
+  }
+  return stride;
+}
+
+void draw_left_axis(Svg& svg, const PlacedPanel& placed, const Palette& palette) {
+  const Panel& panel = *placed.panel;
+  std::vector<double> at;
+  for (const Tick& tick : panel.y.ticks) at.push_back(placed.y(tick.at));
+  const LabelStride stride =
+      label_stride(panel.y, at, std::vector<double>(at.size(), panel.y.names ? 0 : kTickSize));
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    if (panel.y.grid) {
+      svg.line(placed.left, at[i], placed.left + placed.width, at[i], colour(palette, Role::grid));
+    }
+    if (!stride.has_label(i)) continue;
+    svg.text(placed.left - 9, at[i] + 4, tick_text(panel.y.ticks[i]),
+             {kTickSize, colour(palette, Role::soft), Svg::Anchor::end});
+  }
+  if (panel.y.title.empty()) return;
+  svg.text(placed.left - left_axis_width(panel) + 12, placed.top + panel.height / 2,
+           fitting(panel.y.title, panel.height + 20, kTickSize),
+           {kTickSize, colour(palette, Role::soft), Svg::Anchor::middle, false, -90});
+}
+
+/// Names of categories, rotated if one is wider than its slot. \return height used, px
+double draw_names(Svg& svg, const PlacedPanel& placed, const Palette& palette) {
+  const Panel& panel = *placed.panel;
+  const double bottom = placed.top + panel.height;
+  const double slot = placed.width / std::max(1.0, panel.x.high - panel.x.low);
+  const bool rotated = std::ranges::any_of(panel.x.ticks, [&](const Tick& tick) {
+    return text_width(tick_text(tick), kNameSize) > slot - 6;
+  });
+  for (const Tick& tick : panel.x.ticks) {
+    const double x = placed.x(tick.at);
+    if (rotated) {
+      svg.text(x + 5, bottom + 20, tick_text(tick),
+               {kNameSize, colour(palette, Role::ink), Svg::Anchor::end, false, -30});
+    } else {
+      svg.text(x, bottom + 20, tick_text(tick),
+               {kNameSize, colour(palette, Role::ink), Svg::Anchor::middle});
+    }
+  }
+  return rotated ? 84 : 34;
+}
+
+/// Ticks of a numeric lower axis. \return height used, px
+double draw_numbers(Svg& svg, const PlacedPanel& placed, const Palette& palette) {
+  const Panel& panel = *placed.panel;
+  const double bottom = placed.top + panel.height;
+  constexpr double kApart = 8;  // px between two labels
+  std::vector<double> at, lengths;
+  for (const Tick& tick : panel.x.ticks) {
+    at.push_back(placed.x(tick.at));
+    lengths.push_back(text_width(tick_text(tick), kTickSize) + kApart);
+  }
+  const LabelStride stride = label_stride(panel.x, at, lengths);
+  for (std::size_t i = 0; i < at.size(); ++i) {
+    if (panel.x.grid) svg.line(at[i], placed.top, at[i], bottom, colour(palette, Role::grid));
+    if (!stride.has_label(i)) continue;
+    svg.text(at[i], bottom + 20, tick_text(panel.x.ticks[i]),
+             {kTickSize, colour(palette, Role::soft), Svg::Anchor::middle});
+  }
+  return 34;
+}
+
+void draw_text(Svg& svg, const PlacedPanel& placed, const Palette& palette, const Mark& mark) {
+  const double available = mark.max_width > 0 ? mark.max_width * placed.width /
+                                                    (placed.panel->x.high - placed.panel->x.low)
+                                              : 0;
+  const auto fits = [&](std::string_view text) {
+    return available == 0 || text_width(text, mark.size, mark.bold) <= available;
+  };
+  const std::string& text = fits(mark.text) ? mark.text : mark.shorter;
+  if (text.empty() || !fits(text)) return;
+  svg.text(placed.x(mark.x[0]) + mark.dx, placed.y(mark.y[0]) + mark.dy, text,
+           {mark.size, colour(palette, mark.role), static_cast<Svg::Anchor>(mark.anchor + 1),
+            mark.bold});
+}
+
+void draw_mark(Svg& svg, const PlacedPanel& placed, const Palette& palette, const Mark& mark) {
+  if (mark.kind == Mark::Kind::text) {
+    draw_text(svg, placed, palette, mark);
+    return;
+  }
+  const bool grouped = !mark.text.empty() || !mark.participant.empty();
+  if (grouped) svg.begin_group(mark.text, mark.participant);
+  std::vector<double> x, y;
+  x.reserve(mark.x.size());
+  y.reserve(mark.y.size());
+  for (const double value : mark.x) x.push_back(placed.x(value));
+  for (const double value : mark.y) y.push_back(placed.y(value));
+  const std::string& fill = colour(palette, mark.role);
+  switch (mark.kind) {
+    case Mark::Kind::rect:
+      svg.area({x[0], x[1], x[1], x[0]}, {y[0], y[0], y[1], y[1]}, fill, mark.opacity, "none", 0);
+      break;
+    case Mark::Kind::area:
+      svg.area(x, y, fill, mark.opacity, fill, mark.size);
+      break;
+    case Mark::Kind::line:
+      svg.path(x, y, fill, mark.size, mark.opacity, mark.dashed);
+      break;
+    case Mark::Kind::interval:
+      svg.line(x[0], y[0], x[0], y[1], fill, mark.size, mark.opacity);
+      break;
+    case Mark::Kind::symbol:
+      draw_symbol(svg, palette, mark.shape, mark.role, x[0] + mark.dx, y[0] + mark.dy, mark.size,
+                  mark.opacity);
+      break;
+    case Mark::Kind::text:
+    case Mark::Kind::label:
+      break;
+  }
+  if (grouped) svg.end_group();
 }
 
 }  // namespace
@@ -208,104 +449,6 @@ void add_interval_across(Panel& panel, Role role, double y, double low, double h
   end(right, high <= panel.x.high, MarkerShape::right, -4);
 }
 
-namespace {
-
-constexpr double kPoint = 7;               // px: half the width of a point and its margin
-constexpr double kBeside = 11;             // px from the point to its label
-constexpr double kLeft = 12, kRight = 12;  // px beside the panel that a label may take
-
-/// Axis-aligned rectangle in px from the panel's upper left corner, y down.
-struct Box {
-  double left, right, top, bottom;
-
-  bool meets(const Box& other) const {
-    return left < other.right && other.left < right && top < other.bottom && other.top < bottom;
-  }
-};
-
-class Placement {
- public:
-  Placement(const Panel& panel, double width) : panel_(panel), width_(width) {
-    for (const Mark& mark : panel.marks) {
-      if (mark.kind == Mark::Kind::line) {
-        for (std::size_t i = 1; i < mark.x.size(); ++i) {
-          take_segment(mark.x[i - 1], mark.y[i - 1], mark.x[i], mark.y[i]);
-        }
-      } else if (mark.kind == Mark::Kind::interval) {
-        take_segment(mark.x[0], mark.y[0], mark.x[0], mark.y[1]);
-      } else if (mark.kind == Mark::Kind::label) {
-        const double px = x(mark.x[0]), py = y(mark.y[0]);
-        taken_.push_back({px - kPoint, px + kPoint, py - kPoint, py + kPoint});
-      }
-    }
-  }
-
-  /// Chooses the candidate position with the fewest overlaps and marks it as taken.
-  Mark put(const Mark& label) {
-    Mark best;
-    Box best_box{};
-    std::ptrdiff_t fewest = std::ssize(taken_) + 4;
-    for (const double dy : {4.0, -10.0, 19.0, -26.0, 35.0, -44.0, 53.0, -62.0, 71.0}) {
-      for (const int anchor : {-1, 1}) {
-        Mark text = label;
-        text.kind = Mark::Kind::text;
-        text.anchor = anchor;
-        text.dx = -kBeside * anchor;
-        text.dy = dy;
-        const Box box = box_of(text);
-        const std::ptrdiff_t hidden = n_hidden(box);
-        if (hidden >= fewest) continue;
-        fewest = hidden;
-        best = std::move(text);
-        best_box = box;
-      }
-    }
-    taken_.push_back(best_box);
-    return best;
-  }
-
- private:
-  void take_segment(double x0, double y0, double x1, double y1) {
-    constexpr int kPieces = 4;  // of an oblique segment, as one bounding box would cover too much
-    const int pieces = x0 == x1 || y0 == y1 ? 1 : kPieces;
-    for (int i = 0; i < pieces; ++i) {
-      const double from = static_cast<double>(i) / pieces, to = static_cast<double>(i + 1) / pieces;
-      const auto [left, right] =
-          std::minmax({x(std::lerp(x0, x1, from)), x(std::lerp(x0, x1, to))});
-      const auto [top, bottom] =
-          std::minmax({y(std::lerp(y0, y1, from)), y(std::lerp(y0, y1, to))});
-      taken_.push_back({left - 2, right + 2, top - 2, bottom + 2});
-    }
-  }
-
-  double x(double value) const {
-    return (value - panel_.x.low) / (panel_.x.high - panel_.x.low) * width_;
-  }
-  double y(double value) const {
-    return (panel_.y.high - value) / (panel_.y.high - panel_.y.low) * panel_.height;
-  }
-
-  Box box_of(const Mark& text) const {
-    const double wide = text_width(text.text, text.size, text.bold);
-    const double left = x(text.x[0]) + text.dx - (text.anchor > 0 ? wide : 0);
-    const double base = y(text.y[0]) + text.dy;
-    return {left, left + wide, base - text.size, base + 3};
-  }
-
-  /// Number of overlaps of a box; extending beyond the panel counts as three.
-  std::ptrdiff_t n_hidden(const Box& box) const {
-    const bool outside = box.left < -kLeft || box.right > width_ + kRight;
-    return std::ranges::count_if(taken_, [&](const Box& other) { return box.meets(other); }) +
-           (outside ? 3 : 0);
-  }
-
-  const Panel& panel_;
-  double width_;
-  std::vector<Box> taken_;  ///< points, intervals, lines, then labels placed so far
-};
-
-}  // namespace
-
 std::vector<Mark> placed_labels(const Panel& panel, double width) {
   Placement placement(panel, width);
   std::vector<Mark> texts;
@@ -413,158 +556,6 @@ std::vector<Figure> figures_of(const Analysis& analysis, const StudyRecord& reco
   std::erase_if(figures, [](const Figure& figure) { return figure.panels.empty(); });
   return figures;
 }
-
-namespace {
-
-constexpr std::size_t kLongestName = 18;  // characters of a name beside an axis
-constexpr double kTickSize = 12, kNameSize = 13, kLineHeight = 15;  // px
-
-const std::string& colour(const Palette& palette, Role role) {
-  return palette[static_cast<std::size_t>(role)];
-}
-
-std::string tick_text(const Tick& tick) { return shortened(tick.label, kLongestName); }
-
-/// The labelled ticks: every `every`-th from `first` on, as many as fit without overlap; the tick
-/// at 0 is labelled.
-struct LabelStride {
-  std::size_t every = 1, first = 0;
-  bool has_label(std::size_t tick) const { return tick % every == first; }
-};
-
-/// \param at px of each tick along the axis \param lengths px of each label along the axis
-LabelStride label_stride(const FigureAxis& axis, const std::vector<double>& at,
-                         const std::vector<double>& lengths) {
-  const std::size_t n = axis.ticks.size();
-  const auto zero = static_cast<std::size_t>(
-      std::ranges::find_if(axis.ticks, [](const Tick& tick) { return tick.at == 0; }) -
-      axis.ticks.begin());
-  LabelStride stride;
-  for (; stride.every < n; ++stride.every) {
-    stride.first = zero < n ? zero % stride.every : 0;
-    bool apart = true;
-    for (std::size_t i = stride.first; i + stride.every < n; i += stride.every) {
-      const std::size_t next = i + stride.every;
-      apart = apart && std::fabs(at[next] - at[i]) >= (lengths[i] + lengths[next]) / 2;
-    }
-    if (apart) break;
-  }
-  return stride;
-}
-
-void draw_left_axis(Svg& svg, const PlacedPanel& placed, const Palette& palette) {
-  const Panel& panel = *placed.panel;
-  std::vector<double> at;
-  for (const Tick& tick : panel.y.ticks) at.push_back(placed.y(tick.at));
-  const LabelStride stride =
-      label_stride(panel.y, at, std::vector<double>(at.size(), panel.y.names ? 0 : kTickSize));
-  for (std::size_t i = 0; i < at.size(); ++i) {
-    if (panel.y.grid) {
-      svg.line(placed.left, at[i], placed.left + placed.width, at[i], colour(palette, Role::grid));
-    }
-    if (!stride.has_label(i)) continue;
-    svg.text(placed.left - 9, at[i] + 4, tick_text(panel.y.ticks[i]),
-             {kTickSize, colour(palette, Role::soft), Svg::Anchor::end});
-  }
-  if (panel.y.title.empty()) return;
-  svg.text(placed.left - left_axis_width(panel) + 12, placed.top + panel.height / 2,
-           fitting(panel.y.title, panel.height + 20, kTickSize),
-           {kTickSize, colour(palette, Role::soft), Svg::Anchor::middle, false, -90});
-}
-
-/// Names of categories, rotated if one is wider than its slot. \return height used, px
-double draw_names(Svg& svg, const PlacedPanel& placed, const Palette& palette) {
-  const Panel& panel = *placed.panel;
-  const double bottom = placed.top + panel.height;
-  const double slot = placed.width / std::max(1.0, panel.x.high - panel.x.low);
-  const bool rotated = std::ranges::any_of(panel.x.ticks, [&](const Tick& tick) {
-    return text_width(tick_text(tick), kNameSize) > slot - 6;
-  });
-  for (const Tick& tick : panel.x.ticks) {
-    const double x = placed.x(tick.at);
-    if (rotated) {
-      svg.text(x + 5, bottom + 20, tick_text(tick),
-               {kNameSize, colour(palette, Role::ink), Svg::Anchor::end, false, -30});
-    } else {
-      svg.text(x, bottom + 20, tick_text(tick),
-               {kNameSize, colour(palette, Role::ink), Svg::Anchor::middle});
-    }
-  }
-  return rotated ? 84 : 34;
-}
-
-/// Ticks of a numeric lower axis. \return height used, px
-double draw_numbers(Svg& svg, const PlacedPanel& placed, const Palette& palette) {
-  const Panel& panel = *placed.panel;
-  const double bottom = placed.top + panel.height;
-  constexpr double kApart = 8;  // px between two labels
-  std::vector<double> at, lengths;
-  for (const Tick& tick : panel.x.ticks) {
-    at.push_back(placed.x(tick.at));
-    lengths.push_back(text_width(tick_text(tick), kTickSize) + kApart);
-  }
-  const LabelStride stride = label_stride(panel.x, at, lengths);
-  for (std::size_t i = 0; i < at.size(); ++i) {
-    if (panel.x.grid) svg.line(at[i], placed.top, at[i], bottom, colour(palette, Role::grid));
-    if (!stride.has_label(i)) continue;
-    svg.text(at[i], bottom + 20, tick_text(panel.x.ticks[i]),
-             {kTickSize, colour(palette, Role::soft), Svg::Anchor::middle});
-  }
-  return 34;
-}
-
-void draw_text(Svg& svg, const PlacedPanel& placed, const Palette& palette, const Mark& mark) {
-  const double available = mark.max_width > 0 ? mark.max_width * placed.width /
-                                                    (placed.panel->x.high - placed.panel->x.low)
-                                              : 0;
-  const auto fits = [&](std::string_view text) {
-    return available == 0 || text_width(text, mark.size, mark.bold) <= available;
-  };
-  const std::string& text = fits(mark.text) ? mark.text : mark.shorter;
-  if (text.empty() || !fits(text)) return;
-  svg.text(placed.x(mark.x[0]) + mark.dx, placed.y(mark.y[0]) + mark.dy, text,
-           {mark.size, colour(palette, mark.role), static_cast<Svg::Anchor>(mark.anchor + 1),
-            mark.bold});
-}
-
-void draw_mark(Svg& svg, const PlacedPanel& placed, const Palette& palette, const Mark& mark) {
-  if (mark.kind == Mark::Kind::text) {
-    draw_text(svg, placed, palette, mark);
-    return;
-  }
-  const bool grouped = !mark.text.empty() || !mark.participant.empty();
-  if (grouped) svg.begin_group(mark.text, mark.participant);
-  std::vector<double> x, y;
-  x.reserve(mark.x.size());
-  y.reserve(mark.y.size());
-  for (const double value : mark.x) x.push_back(placed.x(value));
-  for (const double value : mark.y) y.push_back(placed.y(value));
-  const std::string& fill = colour(palette, mark.role);
-  switch (mark.kind) {
-    case Mark::Kind::rect:
-      svg.area({x[0], x[1], x[1], x[0]}, {y[0], y[0], y[1], y[1]}, fill, mark.opacity, "none", 0);
-      break;
-    case Mark::Kind::area:
-      svg.area(x, y, fill, mark.opacity, fill, mark.size);
-      break;
-    case Mark::Kind::line:
-      svg.path(x, y, fill, mark.size, mark.opacity, mark.dashed);
-      break;
-    case Mark::Kind::interval:
-      svg.line(x[0], y[0], x[0], y[1], fill, mark.size, mark.opacity);
-      break;
-    case Mark::Kind::symbol:
-      draw_symbol(svg, palette, mark.shape, mark.role, x[0] + mark.dx, y[0] + mark.dy, mark.size,
-                  mark.opacity);
-      break;
-    case Mark::Kind::text:
-    case Mark::Kind::label:
-      break;
-  }
-  if (grouped) svg.end_group();
-}
-
-}  // namespace
 
 double left_axis_width(const Panel& panel) {
   constexpr double kLeast = 58, kWithoutTitle = 16, kWithTitle = 44;

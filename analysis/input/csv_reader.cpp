@@ -27,6 +27,18 @@ std::string plain(std::string_view name) {
   return out;
 }
 
+constexpr std::size_t kBlock = std::size_t{1} << 18;
+constexpr std::string_view kTooLong =
+    "record of more than 1 MiB: expected one row a line (is a quote left open?)";
+
+constexpr std::string_view kBareCr =
+    "holds a CR that no LF follows (do lines end in CR alone?): expected lines that end in LF or "
+    "CRLF";
+
+const char* find(const char* from, const char* to, char what) {
+  return static_cast<const char*>(std::memchr(from, what, static_cast<std::size_t>(to - from)));
+}
+
 }  // namespace
 
 std::vector<AlikeColumn> alike_columns(const std::vector<std::string>& found,
@@ -61,22 +73,6 @@ std::string hint_for(std::string_view missing, const std::vector<AlikeColumn>& a
   if (found == alike.end()) return "";
   return " (is '" + printable(found->found, kMostShown) + "' meant?)";
 }
-
-namespace {
-
-constexpr std::size_t kBlock = std::size_t{1} << 18;
-constexpr std::string_view kTooLong =
-    "record of more than 1 MiB: expected one row a line (is a quote left open?)";
-
-constexpr std::string_view kBareCr =
-    "holds a CR that no LF follows (do lines end in CR alone?): expected lines that end in LF or "
-    "CRLF";
-
-const char* find(const char* from, const char* to, char what) {
-  return static_cast<const char*>(std::memchr(from, what, static_cast<std::size_t>(to - from)));
-}
-
-}  // namespace
 
 CsvReader::CsvReader(const std::string& path) : file_(std::make_unique<InputFile>(path, kMaxFile)) {
   buffer_.resize(CsvReader::kMaxRecord + kBlock);

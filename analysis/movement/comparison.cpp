@@ -48,6 +48,8 @@ AdjustedGain gain_of(const std::map<std::uint32_t, std::vector<Observation>>& by
   return gain;
 }
 
+constexpr double kLeastShare = 0.005;
+
 }  // namespace
 
 std::vector<AdjustedGain> adjusted_gains(const MovementTable& table) {
@@ -80,12 +82,6 @@ std::vector<AdjustedGain> adjusted_gains(const MovementTable& table) {
   }
   return gains;
 }
-
-namespace {
-
-constexpr double kLeastShare = 0.005;
-
-}  // namespace
 
 std::optional<double> on_scale(MeasureScale scale, const std::optional<double>& value) {
   if (!value) return std::nullopt;

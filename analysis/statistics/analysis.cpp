@@ -11,7 +11,6 @@
 #include "analysis/text.h"
 
 namespace palpate::analysis {
-
 namespace {
 
 constexpr double kPer = 100;  // trials to which slopes refer
@@ -276,24 +275,6 @@ void adjust(Practice& practice) {
   for (std::size_t i = 0; i < tests.size(); ++i) tests[i]->p_holm = adjusted[i];
 }
 
-}  // namespace
-
-Practice practice_effects(const TrialTable& table, const Description& description,
-                          double too_fast) {
-  Practice out;
-  const AllSums sums = sum_up(table, description, too_fast);
-  for (std::size_t r = 0; r < sums.size(); ++r) {
-    out.learning.push_back(learning(sums[r], overall_mean(description.participant_cells, r)));
-  }
-  for (const RendererPair& pair : renderer_pairs(table.renderers)) {
-    out.pairs.push_back(pair_practice(description, sums, pair));
-  }
-  adjust(out);
-  return out;
-}
-
-namespace {
-
 constexpr double kMuchExcluded = 0.10;       // of a renderer's trials
 constexpr double kUnequallyExcluded = 0.05;  // difference of two renderers' proportions
 constexpr double kManyTimeOuts = 0.05;       // of a cell's trials
@@ -483,6 +464,20 @@ void warn_of_practice(Analysis& analysis) {
 }
 
 }  // namespace
+
+Practice practice_effects(const TrialTable& table, const Description& description,
+                          double too_fast) {
+  Practice out;
+  const AllSums sums = sum_up(table, description, too_fast);
+  for (std::size_t r = 0; r < sums.size(); ++r) {
+    out.learning.push_back(learning(sums[r], overall_mean(description.participant_cells, r)));
+  }
+  for (const RendererPair& pair : renderer_pairs(table.renderers)) {
+    out.pairs.push_back(pair_practice(description, sums, pair));
+  }
+  adjust(out);
+  return out;
+}
 
 double Exclusions::proportion_excluded() const {
   if (n_trials == 0) return 0;

@@ -10,13 +10,6 @@
 #include <utility>
 
 namespace palpate::analysis {
-
-bool TimeOutGroup::has_limit() const { return std::isfinite(limit) && limit > 0; }
-
-double TimeOutCell::proportion() const {
-  return n_trials == 0 ? 0 : static_cast<double>(n_timeouts) / static_cast<double>(n_trials);
-}
-
 namespace {
 
 void find_most_affected(const std::vector<ParticipantCell>& participants, TimeOutCell& cell) {
@@ -35,37 +28,6 @@ void find_most_affected(const std::vector<ParticipantCell>& participants, TimeOu
     cell.largest_proportion = proportion;
   }
 }
-
-}  // namespace
-
-TimeOuts time_outs(const TrialTable& table, const Description& description) {
-  TimeOuts out;
-  const std::size_t n_shapes = table.shapes.size();
-  out.cells.assign(table.renderers.size(), std::vector<TimeOutCell>(n_shapes));
-  using ParticipantAndLimit = std::pair<std::uint32_t, double>;  // participant and limit
-  std::vector<std::map<ParticipantAndLimit, std::size_t>> counts(table.renderers.size() * n_shapes);
-  for (const TrialRow& row : table.rows) {
-    if (!row.timed_out) continue;
-    // NaN would break the ordering of the map.
-    const double limit = std::isfinite(row.response_time) ? row.response_time : 0;
-    ++counts[row.renderer * n_shapes + row.shape][{row.participant, limit}];
-  }
-  for (std::size_t r = 0; r < out.cells.size(); ++r) {
-    for (std::size_t s = 0; s < n_shapes; ++s) {
-      TimeOutCell& cell = out.cells[r][s];
-      cell.n_trials = description.accuracy[r][s].n_trials;
-      for (const auto& [key, n] : counts[r * n_shapes + s]) {
-        cell.groups.push_back({key.first, key.second, n});
-        cell.n_timeouts += n;
-      }
-      out.any = out.any || cell.n_timeouts > 0;
-      find_most_affected(description.participant_cells[r][s], cell);
-    }
-  }
-  return out;
-}
-
-namespace {
 
 constexpr double kLogRoot2Pi = 0.91893853320467274178;
 constexpr int kMostSteps = 100;
@@ -346,6 +308,39 @@ CensoredEstimate estimate_shape(const Description& description, const TimeOuts& 
 }
 
 }  // namespace
+
+bool TimeOutGroup::has_limit() const { return std::isfinite(limit) && limit > 0; }
+
+double TimeOutCell::proportion() const {
+  return n_trials == 0 ? 0 : static_cast<double>(n_timeouts) / static_cast<double>(n_trials);
+}
+
+TimeOuts time_outs(const TrialTable& table, const Description& description) {
+  TimeOuts out;
+  const std::size_t n_shapes = table.shapes.size();
+  out.cells.assign(table.renderers.size(), std::vector<TimeOutCell>(n_shapes));
+  using ParticipantAndLimit = std::pair<std::uint32_t, double>;  // participant and limit
+  std::vector<std::map<ParticipantAndLimit, std::size_t>> counts(table.renderers.size() * n_shapes);
+  for (const TrialRow& row : table.rows) {
+    if (!row.timed_out) continue;
+    // NaN would break the ordering of the map.
+    const double limit = std::isfinite(row.response_time) ? row.response_time : 0;
+    ++counts[row.renderer * n_shapes + row.shape][{row.participant, limit}];
+  }
+  for (std::size_t r = 0; r < out.cells.size(); ++r) {
+    for (std::size_t s = 0; s < n_shapes; ++s) {
+      TimeOutCell& cell = out.cells[r][s];
+      cell.n_trials = description.accuracy[r][s].n_trials;
+      for (const auto& [key, n] : counts[r * n_shapes + s]) {
+        cell.groups.push_back({key.first, key.second, n});
+        cell.n_timeouts += n;
+      }
+      out.any = out.any || cell.n_timeouts > 0;
+      find_most_affected(description.participant_cells[r][s], cell);
+    }
+  }
+  return out;
+}
 
 std::vector<CensoredEstimate> censored_by_shape(const Description& description,
                                                 const TimeOuts& time_outs,

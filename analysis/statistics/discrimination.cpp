@@ -15,53 +15,6 @@ using protocols::LevelScale;
 
 constexpr double kNoBound = std::numeric_limits<double>::infinity();
 
-}  // namespace
-
-Discrimination discrimination(const PsychometricFit& fit,
-                              const protocols::PsychometricFunction& function,
-                              std::optional<double> standard) {
-  const auto level = [&](double threshold, double slope, double share) {
-    return psychometric_level(function, {threshold, slope}, share);
-  };
-  const auto& [threshold, slope, guess, lapse] = fit.parameters;
-  Discrimination result;
-  result.pse = level(threshold, slope, 0.5);
-  // PSE and threshold are equal except for the Weibull function, where the slope is held fixed.
-  result.pse_ci95 = {level(fit.threshold_ci95.low, slope, 0.5),
-                     level(fit.threshold_ci95.high, slope, 0.5)};
-  const auto half = [&](double at_slope) {
-    // Depends on the scale only: equal at any threshold.
-    const auto place = [&](double share) {
-      return protocols::scale_position(function.scale, level(1, at_slope, share));
-    };
-    return 0.5 * std::abs(place(0.75) - place(0.25));
-  };
-  const auto& [flat, steep] = fit.slope_ci95;
-  const double widest = flat > 0 ? half(flat) : kNoBound;
-  const double narrowest = std::isfinite(steep) ? half(steep) : 0;
-  if (function.scale == LevelScale::linear) {
-    result.jnd = half(slope);
-    result.jnd_ci95 = {narrowest, widest};
-    const double base = standard.value_or(result.pse);
-    if (!(base > 0)) return result;
-    result.weber_fraction = *result.jnd / base;
-    result.weber_fraction_ci95 = {narrowest / base, widest / base};
-    return result;
-  }
-  const auto ratio = [&](double distance) {
-    return std::isfinite(distance) ? protocols::level_at(function.scale, distance) - 1 : kNoBound;
-  };
-  result.weber_fraction = ratio(half(slope));
-  result.weber_fraction_ci95 = {ratio(narrowest), ratio(widest)};
-  const double base = standard.value_or(result.pse);
-  result.jnd = *result.weber_fraction * base;
-  result.jnd_ci95 = {result.weber_fraction_ci95->low * base,
-                     result.weber_fraction_ci95->high * base};
-  return result;
-}
-
-namespace {
-
 const double kZ975 = 1.959963984540054;
 const double kSqrt2 = 1.4142135623730951;
 
@@ -112,7 +65,71 @@ void add_same_different(Detectability& result, double signal, double noise) {
   result.d_prime_ci95 = around(d, *result.d_prime_se);
 }
 
+std::vector<Type2Roc::Point> type2_curve(std::vector<ConfidenceTrial> trials, double correct,
+                                         double wrong) {
+  std::sort(trials.begin(), trials.end(),
+            [](const auto& a, const auto& b) { return a.confidence > b.confidence; });
+  std::vector<Type2Roc::Point> curve{{0, 0}};
+  Type2Roc::Point at{0, 0};
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    (trials[i].correct ? at.correct : at.wrong) += 1 / (trials[i].correct ? correct : wrong);
+    if (i + 1 == trials.size() || trials[i + 1].confidence != trials[i].confidence)
+      curve.push_back(at);
+  }
+  return curve;
+}
+
+double variance_of_mean(const std::vector<double>& values, double mean_value) {
+  double sum = 0;
+  for (const double value : values) sum += (value - mean_value) * (value - mean_value);
+  const auto n = static_cast<double>(values.size());
+  return sum / (n - 1) / n;
+}
+
 }  // namespace
+
+Discrimination discrimination(const PsychometricFit& fit,
+                              const protocols::PsychometricFunction& function,
+                              std::optional<double> standard) {
+  const auto level = [&](double threshold, double slope, double share) {
+    return psychometric_level(function, {threshold, slope}, share);
+  };
+  const auto& [threshold, slope, guess, lapse] = fit.parameters;
+  Discrimination result;
+  result.pse = level(threshold, slope, 0.5);
+  // PSE and threshold are equal except for the Weibull function, where the slope is held fixed.
+  result.pse_ci95 = {level(fit.threshold_ci95.low, slope, 0.5),
+                     level(fit.threshold_ci95.high, slope, 0.5)};
+  const auto half = [&](double at_slope) {
+    // Depends on the scale only: equal at any threshold.
+    const auto place = [&](double share) {
+      return protocols::scale_position(function.scale, level(1, at_slope, share));
+    };
+    return 0.5 * std::abs(place(0.75) - place(0.25));
+  };
+  const auto& [flat, steep] = fit.slope_ci95;
+  const double widest = flat > 0 ? half(flat) : kNoBound;
+  const double narrowest = std::isfinite(steep) ? half(steep) : 0;
+  if (function.scale == LevelScale::linear) {
+    result.jnd = half(slope);
+    result.jnd_ci95 = {narrowest, widest};
+    const double base = standard.value_or(result.pse);
+    if (!(base > 0)) return result;
+    result.weber_fraction = *result.jnd / base;
+    result.weber_fraction_ci95 = {narrowest / base, widest / base};
+    return result;
+  }
+  const auto ratio = [&](double distance) {
+    return std::isfinite(distance) ? protocols::level_at(function.scale, distance) - 1 : kNoBound;
+  };
+  result.weber_fraction = ratio(half(slope));
+  result.weber_fraction_ci95 = {ratio(narrowest), ratio(widest)};
+  const double base = standard.value_or(result.pse);
+  result.jnd = *result.weber_fraction * base;
+  result.jnd_ci95 = {result.weber_fraction_ci95->low * base,
+                     result.weber_fraction_ci95->high * base};
+  return result;
+}
 
 Detectability detectability(const DetectionCounts& counts, DetectionTask task) {
   Detectability result;
@@ -174,31 +191,6 @@ ForcedChoiceDetectability forced_choice_detectability(int correct, int trials, i
                       forced_choice_d_prime(shares.high, alternatives).value_or(kInfinity)};
   return out;
 }
-
-namespace {
-
-std::vector<Type2Roc::Point> type2_curve(std::vector<ConfidenceTrial> trials, double correct,
-                                         double wrong) {
-  std::sort(trials.begin(), trials.end(),
-            [](const auto& a, const auto& b) { return a.confidence > b.confidence; });
-  std::vector<Type2Roc::Point> curve{{0, 0}};
-  Type2Roc::Point at{0, 0};
-  for (std::size_t i = 0; i < trials.size(); ++i) {
-    (trials[i].correct ? at.correct : at.wrong) += 1 / (trials[i].correct ? correct : wrong);
-    if (i + 1 == trials.size() || trials[i + 1].confidence != trials[i].confidence)
-      curve.push_back(at);
-  }
-  return curve;
-}
-
-double variance_of_mean(const std::vector<double>& values, double mean_value) {
-  double sum = 0;
-  for (const double value : values) sum += (value - mean_value) * (value - mean_value);
-  const auto n = static_cast<double>(values.size());
-  return sum / (n - 1) / n;
-}
-
-}  // namespace
 
 Type2Roc type2_roc(const std::vector<ConfidenceTrial>& trials) {
   Type2Roc result;

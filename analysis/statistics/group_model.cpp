@@ -22,86 +22,6 @@ using Eigen::VectorXd;
 constexpr double kLeastPart = 1e-20;
 constexpr double kLeastIntegral = 1e-300;
 
-}  // namespace
-
-GroupLikelihood group_likelihood(const MatrixXd& likelihood, double log_scale) {
-  GroupLikelihood out;
-  const double greatest = likelihood.maxCoeff();
-  out.log_scale = log_scale + std::log(greatest);
-  const MatrixXd values = likelihood / greatest;
-  const VectorXd rows = values.rowwise().maxCoeff(), columns = values.colwise().maxCoeff();
-  const auto range = [](const VectorXd& most) {
-    Index low = 0, high = most.size() - 1;
-    while (most[low] < kLeastPart) ++low;
-    while (most[high] < kLeastPart) --high;
-    return std::pair{low, high - low + 1};
-  };
-  const auto [row, n_rows] = range(rows);
-  const auto [column, n_columns] = range(columns);
-  out.first_row = static_cast<std::size_t>(row);
-  out.first_column = static_cast<std::size_t>(column);
-  out.values = values.block(row, column, n_rows, n_columns);
-  return out;
-}
-
-double group_t(double likelihood_ratio, std::size_t n) {
-  const auto count = static_cast<double>(n);
-  return std::sqrt((count - 1) * std::expm1(std::max(0.0, likelihood_ratio) / count));
-}
-
-double group_p(double likelihood_ratio, std::size_t n) {
-  const boost::math::students_t t(static_cast<double>(n) - 1);
-  return 2 * cdf(complement(t, group_t(likelihood_ratio, n)));
-}
-
-double group_limit(std::size_t n, double confidence) {
-  const auto count = static_cast<double>(n);
-  const double t = quantile(boost::math::students_t(count - 1), 0.5 + confidence / 2);
-  return count * std::log1p(t * t / (count - 1));
-}
-
-std::optional<double> likelihood_ratio_end(const std::function<double(double)>& likelihood_ratio,
-                                           double from, double edge, double first_step,
-                                           double limit) {
-  const double side = edge > from ? 1 : -1, most = std::abs(edge - from);
-  const auto excess = [&](double distance) {
-    return std::sqrt(std::max(0.0, likelihood_ratio(from + side * distance))) - std::sqrt(limit);
-  };
-  double low = 0, at_low = -std::sqrt(limit), high = std::min(first_step, most), at_high = 0;
-  if (most == 0) return std::nullopt;
-  for (;;) {
-    at_high = excess(high);
-    if (at_high > 0) break;
-    if (high >= most) return std::nullopt;
-    const double slope = (at_high + std::sqrt(limit)) / high;
-    const double guess = slope > 0 ? 1.1 * std::sqrt(limit) / slope : 0;
-    low = high;
-    at_low = at_high;
-    high = std::min(most, std::clamp(guess, 1.15 * high, 3 * high));
-  }
-  // Ridders' relative of false position that halves a stuck end (Dowell & Jarratt 1971).
-  int stuck = 0;
-  for (int i = 0; i < 60 && high - low > 1e-9 * most; ++i) {
-    const double middle = (low * at_high - high * at_low) / (at_high - at_low);
-    const double value = excess(middle);
-    if (std::abs(value) < 1e-9) return from + side * middle;
-    if (value > 0) {
-      high = middle;
-      at_high = value;
-      at_low *= stuck == 1 ? 0.5 : 1;
-      stuck = 1;
-    } else {
-      low = middle;
-      at_low = value;
-      at_high *= stuck == -1 ? 0.5 : 1;
-      stuck = -1;
-    }
-  }
-  return from + side * 0.5 * (low + high);
-}
-
-namespace {
-
 // Parameters of a normal coordinate: its mean in units of an axis, and the log of its SD.
 
 double unit_of(const GroupAxis& axis) { return 10 * axis.least_sd; }
@@ -332,27 +252,6 @@ GroupMoments moments_of(const GroupData& data, const SettingFits& fits, std::siz
   }
   return out;
 }
-
-}  // namespace
-
-GroupFit fit_group(const GroupData& data, bool intervals) {
-  GroupFit out;
-  const SettingFits fits = fits_of_settings(data);
-  out.setting = fits.best;
-  for (const double total : fits.total) out.log_likelihoods.push_back(-total);
-  for (std::size_t c = 0; c < fits.of.size(); ++c) {
-    GroupCondition one;
-    one.participants = static_cast<std::size_t>(std::ranges::count_if(
-        data.likelihoods[fits.best][c], [](const GroupLikelihood& own) { return !own.empty(); }));
-    one.log_likelihood = -fits.of[c][fits.best].value;
-    one.first = moments_of(data, fits, c, true, one.participants, intervals);
-    one.second = moments_of(data, fits, c, false, one.participants, intervals);
-    out.conditions.push_back(one);
-  }
-  return out;
-}
-
-namespace {
 
 // Two conditions: y1 = a - d/2 and y2 = a + d/2 of the compared coordinate, a and d normal.
 // Parameters: mean and log SD of a, of d, and of the other coordinate in both conditions.
@@ -591,6 +490,99 @@ void put_open_ends(const GroupFit& fit, GroupCoordinate coordinate, std::size_t 
 }
 
 }  // namespace
+
+GroupLikelihood group_likelihood(const MatrixXd& likelihood, double log_scale) {
+  GroupLikelihood out;
+  const double greatest = likelihood.maxCoeff();
+  out.log_scale = log_scale + std::log(greatest);
+  const MatrixXd values = likelihood / greatest;
+  const VectorXd rows = values.rowwise().maxCoeff(), columns = values.colwise().maxCoeff();
+  const auto range = [](const VectorXd& most) {
+    Index low = 0, high = most.size() - 1;
+    while (most[low] < kLeastPart) ++low;
+    while (most[high] < kLeastPart) --high;
+    return std::pair{low, high - low + 1};
+  };
+  const auto [row, n_rows] = range(rows);
+  const auto [column, n_columns] = range(columns);
+  out.first_row = static_cast<std::size_t>(row);
+  out.first_column = static_cast<std::size_t>(column);
+  out.values = values.block(row, column, n_rows, n_columns);
+  return out;
+}
+
+double group_t(double likelihood_ratio, std::size_t n) {
+  const auto count = static_cast<double>(n);
+  return std::sqrt((count - 1) * std::expm1(std::max(0.0, likelihood_ratio) / count));
+}
+
+double group_p(double likelihood_ratio, std::size_t n) {
+  const boost::math::students_t t(static_cast<double>(n) - 1);
+  return 2 * cdf(complement(t, group_t(likelihood_ratio, n)));
+}
+
+double group_limit(std::size_t n, double confidence) {
+  const auto count = static_cast<double>(n);
+  const double t = quantile(boost::math::students_t(count - 1), 0.5 + confidence / 2);
+  return count * std::log1p(t * t / (count - 1));
+}
+
+std::optional<double> likelihood_ratio_end(const std::function<double(double)>& likelihood_ratio,
+                                           double from, double edge, double first_step,
+                                           double limit) {
+  const double side = edge > from ? 1 : -1, most = std::abs(edge - from);
+  const auto excess = [&](double distance) {
+    return std::sqrt(std::max(0.0, likelihood_ratio(from + side * distance))) - std::sqrt(limit);
+  };
+  double low = 0, at_low = -std::sqrt(limit), high = std::min(first_step, most), at_high = 0;
+  if (most == 0) return std::nullopt;
+  for (;;) {
+    at_high = excess(high);
+    if (at_high > 0) break;
+    if (high >= most) return std::nullopt;
+    const double slope = (at_high + std::sqrt(limit)) / high;
+    const double guess = slope > 0 ? 1.1 * std::sqrt(limit) / slope : 0;
+    low = high;
+    at_low = at_high;
+    high = std::min(most, std::clamp(guess, 1.15 * high, 3 * high));
+  }
+  // Ridders' relative of false position that halves a stuck end (Dowell & Jarratt 1971).
+  int stuck = 0;
+  for (int i = 0; i < 60 && high - low > 1e-9 * most; ++i) {
+    const double middle = (low * at_high - high * at_low) / (at_high - at_low);
+    const double value = excess(middle);
+    if (std::abs(value) < 1e-9) return from + side * middle;
+    if (value > 0) {
+      high = middle;
+      at_high = value;
+      at_low *= stuck == 1 ? 0.5 : 1;
+      stuck = 1;
+    } else {
+      low = middle;
+      at_low = value;
+      at_high *= stuck == -1 ? 0.5 : 1;
+      stuck = -1;
+    }
+  }
+  return from + side * 0.5 * (low + high);
+}
+
+GroupFit fit_group(const GroupData& data, bool intervals) {
+  GroupFit out;
+  const SettingFits fits = fits_of_settings(data);
+  out.setting = fits.best;
+  for (const double total : fits.total) out.log_likelihoods.push_back(-total);
+  for (std::size_t c = 0; c < fits.of.size(); ++c) {
+    GroupCondition one;
+    one.participants = static_cast<std::size_t>(std::ranges::count_if(
+        data.likelihoods[fits.best][c], [](const GroupLikelihood& own) { return !own.empty(); }));
+    one.log_likelihood = -fits.of[c][fits.best].value;
+    one.first = moments_of(data, fits, c, true, one.participants, intervals);
+    one.second = moments_of(data, fits, c, false, one.participants, intervals);
+    out.conditions.push_back(one);
+  }
+  return out;
+}
 
 GroupDifference compare_group(const GroupData& data, const GroupFit& fit,
                               GroupCoordinate coordinate, std::size_t reference,

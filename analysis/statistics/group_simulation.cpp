@@ -87,38 +87,6 @@ GroupStudy yes_no() {
   return study;
 }
 
-}  // namespace
-
-GroupStudy hardest_group_study() {
-  GroupStudy study = forced_choice("staircase, n 6, 42 trials, lapses 5 %", 3, 6, 0.05);
-  study.tracks = {log_staircase(42)};
-  return study;
-}
-
-std::vector<GroupStudy> group_coverage_studies() {
-  std::vector<GroupStudy> out;
-  out.push_back(two_sided("n 5, 84 trials", 5, 84, 0.02));
-  out.push_back(two_sided("n 6, 42 trials", 6, 42, 0.02));
-  out.push_back(two_sided("n 6, 168 trials", 6, 168, 0.02));
-  out.push_back(two_sided("n 12, 84 trials", 12, 84, 0.02));
-  out.push_back(two_sided("n 12, 42 trials, lapses 5 %", 12, 42, 0.05));
-  out.push_back(two_sided("n 6, 84 trials, lapses differ", 6, 84, 0.03));
-  out.back().lapses_differ = true;
-  out.push_back(two_sided("n 6, 84 trials, JND 12 with levels 35 apart", 6, 84, 0.02));
-  out.back().log_width = std::log(12);
-  out.back().tracks = {protocols::ConstantStimuli{evenly(195, 405, 7), 12}};
-  out.push_back(two_sided_quest());
-  out.push_back(forced_choice("staircase, n 8, 84 trials", 2, 8, 0.02));
-  out.back().tracks = {log_staircase(84)};
-  out.push_back(forced_choice("constant, n 6, 84 trials, no lapses", 3, 6, 0));
-  out.back().tracks = {protocols::ConstantStimuli{{0.3, 0.5, 0.7, 1, 1.4, 2, 3}, 12}};
-  out.push_back(yes_no());
-  out.push_back(hardest_group_study());
-  return out;
-}
-
-namespace {
-
 /// One participant with one renderer.
 struct SimulatedObserver {
   double location = 0, width = 1, low = 0, lapse = 0;
@@ -149,37 +117,6 @@ GroupAnswers answers_of(const GroupStudy& study, const SimulatedObserver& observ
     out.catch_successes += random.unit() < observer.low ? 1 : 0;
   return out;
 }
-
-}  // namespace
-
-std::vector<std::vector<GroupAnswers>> simulated_answers(const GroupStudy& study,
-                                                         std::uint64_t seed, std::size_t number) {
-  std::vector<std::vector<GroupAnswers>> out(2);
-  for (std::size_t i = 0; i < study.participants; ++i) {
-    Random random(seed, {0x67, number, i});
-    const double location = study.location + study.location_sd * random.normal();
-    const double moved = study.location_difference + study.location_difference_sd * random.normal();
-    const double log_width = study.log_width + study.log_width_sd * random.normal();
-    const double log_ratio = study.log_ratio + study.log_ratio_sd * random.normal();
-    // More than a third of lapses is no task.
-    const double drawn = -study.lapse * std::log(1 - random.unit());
-    const double lapse = study.lapses_differ ? std::min(drawn, 0.3) : study.lapse;
-    for (std::size_t c = 0; c < 2; ++c) {
-      const double half = c == 0 ? -0.5 : 0.5;
-      SimulatedObserver observer;
-      observer.location = location + half * moved;
-      observer.width = std::exp(log_width + half * log_ratio);
-      observer.lapse = lapse;
-      observer.low = study.model.asymptotes == GroupAsymptotes::both_lapse    ? lapse
-                     : study.model.asymptotes == GroupAsymptotes::fixed_guess ? study.model.guess
-                                                                              : study.guess;
-      out[c].push_back(answers_of(study, observer, random));
-    }
-  }
-  return out;
-}
-
-namespace {
 
 struct GroupEstimate {
   double estimate = 0, truth = 0;
@@ -246,6 +183,61 @@ GroupCoverage one_study(const GroupStudy& study, std::size_t number,
 }
 
 }  // namespace
+
+GroupStudy hardest_group_study() {
+  GroupStudy study = forced_choice("staircase, n 6, 42 trials, lapses 5 %", 3, 6, 0.05);
+  study.tracks = {log_staircase(42)};
+  return study;
+}
+
+std::vector<GroupStudy> group_coverage_studies() {
+  std::vector<GroupStudy> out;
+  out.push_back(two_sided("n 5, 84 trials", 5, 84, 0.02));
+  out.push_back(two_sided("n 6, 42 trials", 6, 42, 0.02));
+  out.push_back(two_sided("n 6, 168 trials", 6, 168, 0.02));
+  out.push_back(two_sided("n 12, 84 trials", 12, 84, 0.02));
+  out.push_back(two_sided("n 12, 42 trials, lapses 5 %", 12, 42, 0.05));
+  out.push_back(two_sided("n 6, 84 trials, lapses differ", 6, 84, 0.03));
+  out.back().lapses_differ = true;
+  out.push_back(two_sided("n 6, 84 trials, JND 12 with levels 35 apart", 6, 84, 0.02));
+  out.back().log_width = std::log(12);
+  out.back().tracks = {protocols::ConstantStimuli{evenly(195, 405, 7), 12}};
+  out.push_back(two_sided_quest());
+  out.push_back(forced_choice("staircase, n 8, 84 trials", 2, 8, 0.02));
+  out.back().tracks = {log_staircase(84)};
+  out.push_back(forced_choice("constant, n 6, 84 trials, no lapses", 3, 6, 0));
+  out.back().tracks = {protocols::ConstantStimuli{{0.3, 0.5, 0.7, 1, 1.4, 2, 3}, 12}};
+  out.push_back(yes_no());
+  out.push_back(hardest_group_study());
+  return out;
+}
+
+std::vector<std::vector<GroupAnswers>> simulated_answers(const GroupStudy& study,
+                                                         std::uint64_t seed, std::size_t number) {
+  std::vector<std::vector<GroupAnswers>> out(2);
+  for (std::size_t i = 0; i < study.participants; ++i) {
+    Random random(seed, {0x67, number, i});
+    const double location = study.location + study.location_sd * random.normal();
+    const double moved = study.location_difference + study.location_difference_sd * random.normal();
+    const double log_width = study.log_width + study.log_width_sd * random.normal();
+    const double log_ratio = study.log_ratio + study.log_ratio_sd * random.normal();
+    // More than a third of lapses is no task.
+    const double drawn = -study.lapse * std::log(1 - random.unit());
+    const double lapse = study.lapses_differ ? std::min(drawn, 0.3) : study.lapse;
+    for (std::size_t c = 0; c < 2; ++c) {
+      const double half = c == 0 ? -0.5 : 0.5;
+      SimulatedObserver observer;
+      observer.location = location + half * moved;
+      observer.width = std::exp(log_width + half * log_ratio);
+      observer.lapse = lapse;
+      observer.low = study.model.asymptotes == GroupAsymptotes::both_lapse    ? lapse
+                     : study.model.asymptotes == GroupAsymptotes::fixed_guess ? study.model.guess
+                                                                              : study.guess;
+      out[c].push_back(answers_of(study, observer, random));
+    }
+  }
+  return out;
+}
 
 std::vector<GroupCoverage> group_coverage(const std::vector<GroupStudy>& studies,
                                           const GroupCoverageSettings& settings) {

@@ -16,7 +16,6 @@
 #include "analysis/statistics/reml.h"
 
 namespace palpate::analysis {
-
 namespace {
 
 using Eigen::Index;
@@ -160,74 +159,6 @@ void test(const Scores& scores, double all_error, double n_cells, AnovaEffect& e
   }
   effect.sphericity = sphericity(scores, n_cells, effect);
 }
-
-}  // namespace
-
-RmAnova rm_anova(const ParticipantCells& participant_cells) {
-  RmAnova out;
-  constexpr std::array kNames{"renderer", "shape", "renderer:shape"};
-  for (std::size_t i = 0; i < kNames.size(); ++i) out.effects[i].name = kNames[i];
-  const std::size_t n_renderers = participant_cells.size();
-  const std::size_t n_shapes = n_renderers == 0 ? 0 : participant_cells[0].size();
-  const std::size_t n_participants = n_shapes == 0 ? 0 : participant_cells[0][0].size();
-  const auto cell = [&](std::size_t p, std::size_t c) -> const ParticipantCell& {
-    return participant_cells[c / n_shapes][c % n_shapes][p];
-  };
-  std::vector<std::size_t> complete;
-  for (std::size_t p = 0; p < n_participants; ++p) {
-    bool all = true;
-    for (std::size_t c = 0; all && c < n_renderers * n_shapes; ++c) all = cell(p, c).n_used > 0;
-    (all ? complete : out.dropped).push_back(p);
-  }
-  out.n_participants_used = complete.size();
-
-  const auto refuse = [&](std::size_t effect, const std::string& reason) {
-    out.effects[effect].undefined = out.effects[effect].sphericity.undefined = reason;
-  };
-  if (complete.size() < 2) {
-    out.undefined = complete.empty() ? "no participant has a time in every cell"
-                                     : "one participant, so no variance between participants";
-    for (std::size_t i = 0; i < kNames.size(); ++i) refuse(i, out.undefined);
-    return out;
-  }
-  if (n_renderers < 2) out.undefined = "only one renderer in the data";
-  if (n_shapes < 2) add_reason(out.undefined, "only one shape in the data");
-
-  MatrixXd cells(static_cast<Index>(complete.size()), static_cast<Index>(n_renderers * n_shapes));
-  for (Index i = 0; i < cells.rows(); ++i) {
-    for (Index c = 0; c < cells.cols(); ++c) {
-      cells(i, c) =
-          cell(complete[static_cast<std::size_t>(i)], static_cast<std::size_t>(c)).mean_log;
-    }
-  }
-  const auto renderers = static_cast<Index>(n_renderers), shapes = static_cast<Index>(n_shapes);
-  const std::array<Scores, 3> scores{score(cells, contrasts(renderers), average(shapes)),
-                                     score(cells, average(renderers), contrasts(shapes)),
-                                     score(cells, contrasts(renderers), contrasts(shapes))};
-  double all_error = score(cells, average(renderers), average(shapes)).ss_error;
-  for (const Scores& effect : scores) all_error += effect.ss_error;
-  for (std::size_t i = 0; i < scores.size(); ++i) {
-    if (scores[i].rest.cols() == 0) {
-      refuse(i, out.undefined);
-    } else {
-      test(scores[i], all_error, static_cast<double>(cells.cols()), out.effects[i]);
-    }
-  }
-  if (out.undefined.empty() && std::ranges::all_of(out.effects, [](const AnovaEffect& effect) {
-        return !effect.undefined.empty();
-      })) {
-    out.undefined = kFlat;
-    // Without error variance eta squared would be 1 for any difference.
-    for (AnovaEffect& effect : out.effects) effect.generalized_eta_squared.reset();
-  }
-  return out;
-}
-
-namespace {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
 
 constexpr std::size_t kMaxModelRenderers = 8;
 
@@ -407,6 +338,66 @@ std::string why_no_fit(const ParticipantCells& participant_cells, const ModelCel
 }
 
 }  // namespace
+
+RmAnova rm_anova(const ParticipantCells& participant_cells) {
+  RmAnova out;
+  constexpr std::array kNames{"renderer", "shape", "renderer:shape"};
+  for (std::size_t i = 0; i < kNames.size(); ++i) out.effects[i].name = kNames[i];
+  const std::size_t n_renderers = participant_cells.size();
+  const std::size_t n_shapes = n_renderers == 0 ? 0 : participant_cells[0].size();
+  const std::size_t n_participants = n_shapes == 0 ? 0 : participant_cells[0][0].size();
+  const auto cell = [&](std::size_t p, std::size_t c) -> const ParticipantCell& {
+    return participant_cells[c / n_shapes][c % n_shapes][p];
+  };
+  std::vector<std::size_t> complete;
+  for (std::size_t p = 0; p < n_participants; ++p) {
+    bool all = true;
+    for (std::size_t c = 0; all && c < n_renderers * n_shapes; ++c) all = cell(p, c).n_used > 0;
+    (all ? complete : out.dropped).push_back(p);
+  }
+  out.n_participants_used = complete.size();
+
+  const auto refuse = [&](std::size_t effect, const std::string& reason) {
+    out.effects[effect].undefined = out.effects[effect].sphericity.undefined = reason;
+  };
+  if (complete.size() < 2) {
+    out.undefined = complete.empty() ? "no participant has a time in every cell"
+                                     : "one participant, so no variance between participants";
+    for (std::size_t i = 0; i < kNames.size(); ++i) refuse(i, out.undefined);
+    return out;
+  }
+  if (n_renderers < 2) out.undefined = "only one renderer in the data";
+  if (n_shapes < 2) add_reason(out.undefined, "only one shape in the data");
+
+  MatrixXd cells(static_cast<Index>(complete.size()), static_cast<Index>(n_renderers * n_shapes));
+  for (Index i = 0; i < cells.rows(); ++i) {
+    for (Index c = 0; c < cells.cols(); ++c) {
+      cells(i, c) =
+          cell(complete[static_cast<std::size_t>(i)], static_cast<std::size_t>(c)).mean_log;
+    }
+  }
+  const auto renderers = static_cast<Index>(n_renderers), shapes = static_cast<Index>(n_shapes);
+  const std::array<Scores, 3> scores{score(cells, contrasts(renderers), average(shapes)),
+                                     score(cells, average(renderers), contrasts(shapes)),
+                                     score(cells, contrasts(renderers), contrasts(shapes))};
+  double all_error = score(cells, average(renderers), average(shapes)).ss_error;
+  for (const Scores& effect : scores) all_error += effect.ss_error;
+  for (std::size_t i = 0; i < scores.size(); ++i) {
+    if (scores[i].rest.cols() == 0) {
+      refuse(i, out.undefined);
+    } else {
+      test(scores[i], all_error, static_cast<double>(cells.cols()), out.effects[i]);
+    }
+  }
+  if (out.undefined.empty() && std::ranges::all_of(out.effects, [](const AnovaEffect& effect) {
+        return !effect.undefined.empty();
+      })) {
+    out.undefined = kFlat;
+    // Without error variance eta squared would be 1 for any difference.
+    for (AnovaEffect& effect : out.effects) effect.generalized_eta_squared.reset();
+  }
+  return out;
+}
 
 MixedModel mixed_model(const ParticipantCells& participant_cells,
                        const std::vector<std::string>& renderers,

@@ -16,7 +16,6 @@
 #include "data/base/random.h"
 
 namespace palpate::analysis {
-
 namespace {
 
 struct Signed {
@@ -55,6 +54,39 @@ double normal_lower_tail(const std::vector<Signed>& values, std::uint64_t twice_
   }
   const double z = (static_cast<double>(twice_v) / 2 - total / 2) / std::sqrt(squares / 4);
   return cdf(boost::math::normal(), z);
+}
+
+double normal_cdf(double z) { return cdf(boost::math::normal(), z); }
+
+/// Quantile of sorted resamples, interpolated on the scale of normal quantiles
+/// (Davison & Hinkley 1997, eq. 5.8).
+double resample_quantile(const std::vector<double>& sorted, double p) {
+  const double count = static_cast<double>(sorted.size());
+  const double position = (count + 1) * p, whole = std::floor(position);
+  if (whole < 1) return sorted.front();
+  if (whole >= count) return sorted.back();
+  const double below = sorted[static_cast<std::size_t>(whole) - 1];
+  const double above = sorted[static_cast<std::size_t>(whole)];
+  const double z = normal_quantile(p), z_below = normal_quantile(whole / (count + 1)),
+               z_above = normal_quantile((whole + 1) / (count + 1));
+  return below + (z - z_below) / (z_above - z_below) * (above - below);
+}
+
+constexpr std::size_t kManyPairs =
+    1000;  // pairs; with more, bootstraps in parallel pay for the start of a thread
+constexpr const char* kOnePair = "one participant, so no variance between participants";
+constexpr const char* kNoPairs = "no participant has times for both renderers";
+constexpr const char* kAllEqual = "all differences are equal (no variance)";
+
+/// Reason why inference from these differences is impossible; empty: possible.
+std::string no_inference(const std::vector<double>& differences) {
+  if (differences.empty()) return kNoPairs;
+  if (differences.size() == 1) return kOnePair;
+  return {};
+}
+
+bool no_variance(double sd, double centre) {
+  return sd <= 1e-10 * std::max(1.0, std::fabs(centre));
 }
 
 }  // namespace
@@ -97,26 +129,6 @@ Wilcoxon wilcoxon(const std::vector<double>& differences) {
   test.p = std::min(1.0, 2 * tail);
   return test;
 }
-
-namespace {
-
-double normal_cdf(double z) { return cdf(boost::math::normal(), z); }
-
-/// Quantile of sorted resamples, interpolated on the scale of normal quantiles
-/// (Davison & Hinkley 1997, eq. 5.8).
-double resample_quantile(const std::vector<double>& sorted, double p) {
-  const double count = static_cast<double>(sorted.size());
-  const double position = (count + 1) * p, whole = std::floor(position);
-  if (whole < 1) return sorted.front();
-  if (whole >= count) return sorted.back();
-  const double below = sorted[static_cast<std::size_t>(whole) - 1];
-  const double above = sorted[static_cast<std::size_t>(whole)];
-  const double z = normal_quantile(p), z_below = normal_quantile(whole / (count + 1)),
-               z_above = normal_quantile((whole + 1) / (count + 1));
-  return below + (z - z_below) / (z_above - z_below) * (above - below);
-}
-
-}  // namespace
 
 Bootstrap bca_interval(const std::vector<double>& differences, std::vector<double>& means) {
   Bootstrap out;
@@ -184,27 +196,6 @@ Bootstrap bootstrap_mean(const std::vector<double>& differences, Random& random,
   }
   return bca_interval(differences, means);
 }
-
-namespace {
-
-constexpr std::size_t kManyPairs =
-    1000;  // pairs; with more, bootstraps in parallel pay for the start of a thread
-constexpr const char* kOnePair = "one participant, so no variance between participants";
-constexpr const char* kNoPairs = "no participant has times for both renderers";
-constexpr const char* kAllEqual = "all differences are equal (no variance)";
-
-/// Reason why inference from these differences is impossible; empty: possible.
-std::string no_inference(const std::vector<double>& differences) {
-  if (differences.empty()) return kNoPairs;
-  if (differences.size() == 1) return kOnePair;
-  return {};
-}
-
-bool no_variance(double sd, double centre) {
-  return sd <= 1e-10 * std::max(1.0, std::fabs(centre));
-}
-
-}  // namespace
 
 double percent_reduction(double log_ratio) { return -100 * std::expm1(log_ratio); }
 

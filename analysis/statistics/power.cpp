@@ -14,7 +14,6 @@
 #include "data/base/random.h"
 
 namespace palpate::analysis {
-
 namespace {
 
 struct ShapeGain {
@@ -77,67 +76,6 @@ ShapeGain shape_gain(const ParticipantCells& participant_cells, const RendererPa
   out.variance = std::max(0.0, squares / ((n - 1) * (k - 1)) - residual_variance * noise / (n * k));
   return out;
 }
-
-}  // namespace
-
-Pilot read_pilot(const Analysis& analysis) {
-  Pilot out;
-  const MixedModel& fit = analysis.mixed_model;
-  out.pair = analysis.comparisons.front().pair;
-  out.undefined = fit.undefined;
-  if (!out.undefined.empty()) return out;
-  StudyModel& model = out.model;
-  model.shapes = analysis.table.shapes;
-  for (const ModelEstimate& contrast : fit.contrasts.front()) {
-    model.log_ratios.push_back(contrast.estimate.value_or(0));
-  }
-  model.intercept_sd = fit.random_sds[0];
-  model.gain_sd = fit.random_sds[1];
-  model.correlation = fit.random_correlations[0].value_or(0);
-  model.residual_sd = *fit.residual_sd;
-  const Counts& counts = analysis.description.counts;
-  model.proportion_used =
-      static_cast<double>(counts.n_used_for_times) / static_cast<double>(counts.n_trials);
-
-  const double in_cells = variance_in_cells(analysis.description.participant_cells,
-                                            model.residual_sd * model.residual_sd);
-  const ShapeGain extra = shape_gain(analysis.description.participant_cells, out.pair, in_cells);
-  if (extra.known) {
-    const auto k = static_cast<double>(model.shapes.size());
-    model.shape_gain_sd = std::sqrt(extra.variance);
-    if (extra.variance > 0) model.residual_sd = std::sqrt(in_cells);
-    model.gain_sd = std::sqrt(std::max(0.0, model.gain_sd * model.gain_sd - extra.variance / k));
-  } else {
-    out.notes.push_back(
-        "Participants' gains for single shapes cannot be separated from the common gain in this "
-        "pilot: "
-        "they are taken as 0, which makes the power too high if they vary.");
-  }
-  if (!fit.singular.empty()) {
-    out.notes.push_back("The pilot's fit is singular (" + fit.singular +
-                        "): its standard deviations are imprecise.");
-  }
-  if (fit.n_participants < 10) {
-    constexpr double kShownAsNothing = 0.0005;  // three decimals
-    out.notes.push_back(
-        "Standard deviations from " + counted(fit.n_participants, "participant", "participants") +
-        " are imprecise: also try " +
-        (model.gain_sd < kShownAsNothing
-             ? "--gain-sd 0.1 (gains that differ by some 10 %), as this pilot's is 0."
-             : "a --gain-sd 1.5 times as large."));
-  }
-  if (analysis.comparisons.size() > 1) {
-    out.notes.push_back("The pilot has " + std::to_string(analysis.table.renderers.size()) +
-                        " renderers: this plan covers " + difference_name(out.pair) +
-                        " only, with Holm's adjustment over its shapes; a study of all of them "
-                        "adjusts over more tests and needs more participants.");
-  }
-  out.label = simulated_label(analysis.table.simulated);
-  if (!out.label.empty()) out.notes.push_back(out.label + " in the pilot.");
-  return out;
-}
-
-namespace {
 
 constexpr std::size_t kChunk = 50;  // studies per unit of work of a thread
 
@@ -263,6 +201,63 @@ void count(const StudyModel& model, const Verdicts& verdicts, double alpha, Powe
 }
 
 }  // namespace
+
+Pilot read_pilot(const Analysis& analysis) {
+  Pilot out;
+  const MixedModel& fit = analysis.mixed_model;
+  out.pair = analysis.comparisons.front().pair;
+  out.undefined = fit.undefined;
+  if (!out.undefined.empty()) return out;
+  StudyModel& model = out.model;
+  model.shapes = analysis.table.shapes;
+  for (const ModelEstimate& contrast : fit.contrasts.front()) {
+    model.log_ratios.push_back(contrast.estimate.value_or(0));
+  }
+  model.intercept_sd = fit.random_sds[0];
+  model.gain_sd = fit.random_sds[1];
+  model.correlation = fit.random_correlations[0].value_or(0);
+  model.residual_sd = *fit.residual_sd;
+  const Counts& counts = analysis.description.counts;
+  model.proportion_used =
+      static_cast<double>(counts.n_used_for_times) / static_cast<double>(counts.n_trials);
+
+  const double in_cells = variance_in_cells(analysis.description.participant_cells,
+                                            model.residual_sd * model.residual_sd);
+  const ShapeGain extra = shape_gain(analysis.description.participant_cells, out.pair, in_cells);
+  if (extra.known) {
+    const auto k = static_cast<double>(model.shapes.size());
+    model.shape_gain_sd = std::sqrt(extra.variance);
+    if (extra.variance > 0) model.residual_sd = std::sqrt(in_cells);
+    model.gain_sd = std::sqrt(std::max(0.0, model.gain_sd * model.gain_sd - extra.variance / k));
+  } else {
+    out.notes.push_back(
+        "Participants' gains for single shapes cannot be separated from the common gain in this "
+        "pilot: "
+        "they are taken as 0, which makes the power too high if they vary.");
+  }
+  if (!fit.singular.empty()) {
+    out.notes.push_back("The pilot's fit is singular (" + fit.singular +
+                        "): its standard deviations are imprecise.");
+  }
+  if (fit.n_participants < 10) {
+    constexpr double kShownAsNothing = 0.0005;  // three decimals
+    out.notes.push_back(
+        "Standard deviations from " + counted(fit.n_participants, "participant", "participants") +
+        " are imprecise: also try " +
+        (model.gain_sd < kShownAsNothing
+             ? "--gain-sd 0.1 (gains that differ by some 10 %), as this pilot's is 0."
+             : "a --gain-sd 1.5 times as large."));
+  }
+  if (analysis.comparisons.size() > 1) {
+    out.notes.push_back("The pilot has " + std::to_string(analysis.table.renderers.size()) +
+                        " renderers: this plan covers " + difference_name(out.pair) +
+                        " only, with Holm's adjustment over its shapes; a study of all of them "
+                        "adjusts over more tests and needs more participants.");
+  }
+  out.label = simulated_label(analysis.table.simulated);
+  if (!out.label.empty()) out.notes.push_back(out.label + " in the pilot.");
+  return out;
+}
 
 Power simulate_power(const StudyModel& model, const StudyDesign& design,
                      const PowerSettings& settings) {

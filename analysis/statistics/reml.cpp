@@ -9,7 +9,6 @@
 #include <utility>
 
 namespace palpate::analysis {
-
 namespace {
 
 using Eigen::Index;
@@ -75,6 +74,275 @@ CellDirections directions_of(const Levels& levels, std::size_t r, Index first_ce
     return 1 - e > kNoDirection ? 1 - e : 0.0;
   });
   return out;
+}
+
+constexpr int kMaxSteps = 200;
+// Participants. With more, the criterion had a single minimum in all tests: two starting values
+// suffice as a check.
+constexpr std::size_t kFew = 500;
+constexpr double kOnBoundary = 1e-4;  // threshold of a diagonal theta, as in lme4's isSingular()
+
+/// Lambda's lower triangle with a diagonal >= 0 from any root of Lambda Lambda'.
+VectorXd theta_of(const MatrixXd& root) {
+  const Index q = root.rows();
+  const MatrixXd r =
+      MatrixXd(root.transpose()).householderQr().matrixQR().triangularView<Eigen::Upper>();
+  VectorXd theta(q * (q + 1) / 2);
+  Index k = 0;
+  for (Index column = 0; column < q; ++column) {
+    const double sign = r(column, column) < 0 ? -1 : 1;
+    for (Index row = column; row < q; ++row) theta(k++) = sign * r(column, row);
+  }
+  return theta;
+}
+
+std::vector<Index> diagonal(Index q) {
+  std::vector<Index> out;
+  for (Index column = 0, k = 0; column < q; k += q - column++) out.push_back(k);
+  return out;
+}
+
+/// Newton step with the absolute values of the Hessian's eigenvalues: a descent direction.
+VectorXd newton_step(const RemlPoint& point) {
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(point.hessian);
+  const VectorXd curvature = eigen.eigenvalues().cwiseAbs();
+  const double floor = 1e-10 * std::max(curvature.maxCoeff(), 1e-10);
+  return -eigen.eigenvectors() * (eigen.eigenvectors().transpose() * point.gradient)
+                                     .cwiseQuotient(curvature.cwiseMax(floor));
+}
+
+/// Rounding error of the deviance, larger for large effects with a small residual.
+double rounding(const RemlOptimum& at) {
+  return std::min(
+      1e-6, 1e-13 * std::max(1.0, std::fabs(at.point.deviance)) * (1 + at.theta.squaredNorm()));
+}
+
+/// Descends from theta until the gradient vanishes. The criterion is even in a diagonal theta, so a
+/// starting value on the boundary stays there.
+RemlOptimum descend(const RemlStatistics& data, const MatrixXd& coding, VectorXd theta) {
+  RemlOptimum out;
+  out.theta = std::move(theta);
+  out.point = reml_point(data, coding, out.theta, true);
+  for (int i = 0; i < kMaxSteps; ++i) {
+    const VectorXd step = newton_step(out.point);
+    const double promised = -step.dot(out.point.gradient);
+    const double noise = rounding(out);
+    const double longest = 1 + out.theta.norm();
+    double length = std::min(1.0, longest / step.norm());
+    RemlPoint next;
+    bool lower = false;
+    for (int halved = 0; halved < 40 && !lower; ++halved, length /= 2) {
+      next = reml_point(data, coding, out.theta + length * step, true);
+      lower = next.deviance <= out.point.deviance - 1e-4 * length * promised + noise;
+      if (lower) out.theta += length * step;
+    }
+    if (!lower) break;
+    // Near the minimum the deviance is constant up to rounding: a step is accepted if it reduces
+    // the gradient.
+    const bool done = promised < noise && next.gradient.norm() >= 0.5 * out.point.gradient.norm();
+    out.point = std::move(next);
+    if (promised < noise) out.converged = true;
+    if (done || promised == 0) break;
+  }
+  return out;
+}
+
+/// Among the directions in which Psi is 0, that of steepest descent; none: the Karush-Kuhn-Tucker
+/// conditions hold.
+VectorXd way_off_boundary(const RemlOptimum& at, const MatrixXd& coding, Index q) {
+  const MatrixXd lambda = lower_triangle(at.theta, q);
+  const MatrixXd slope = coding.transpose() * at.point.slope * coding;  // by Lambda Lambda'
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> psi(lambda * lambda.transpose());
+  std::vector<Index> null;
+  for (Index i = 0; i < q; ++i) {
+    if (psi.eigenvalues()(i) <= kOnBoundary * kOnBoundary) null.push_back(i);
+  }
+  if (null.empty()) return VectorXd::Zero(q);
+  const MatrixXd basis = psi.eigenvectors()(Eigen::all, null);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> reduced(basis.transpose() * slope * basis);
+  const double scale = 1e-9 * std::max(1.0, slope.norm());
+  if (reduced.eigenvalues()(0) >= -scale) return VectorXd::Zero(q);
+  return basis * reduced.eigenvectors().col(0);
+}
+
+VectorXd with_small_diagonals_at_zero(VectorXd theta, Index q) {
+  for (const Index k : diagonal(q)) {
+    if (std::fabs(theta(k)) < kOnBoundary) theta(k) = 0;
+  }
+  return theta;
+}
+
+/// descend(), then leaves the boundary if that lowers the deviance, and sets parameters near 0 to
+/// exactly 0.
+RemlOptimum optimum_from(const RemlStatistics& data, const MatrixXd& coding,
+                         const VectorXd& start) {
+  const Index q = data.levels;
+  RemlOptimum best = descend(data, coding, start);
+  for (int i = 0; i < 10; ++i) {
+    best.theta = theta_of(lower_triangle(best.theta, q));
+    const VectorXd snapped = with_small_diagonals_at_zero(best.theta, q);
+    if (snapped != best.theta || !best.converged) {
+      RemlOptimum on = descend(data, coding, snapped);
+      if (on.point.deviance <= best.point.deviance + 1e-8) best = std::move(on);
+    }
+    const VectorXd away = way_off_boundary(best, coding, q);
+    if (away.isZero(0)) break;
+    MatrixXd root(q, q + 1);
+    root << lower_triangle(best.theta, q), 0.1 * away;
+    RemlOptimum off = descend(data, coding, theta_of(root));
+    if (off.point.deviance >= best.point.deviance) break;
+    best = std::move(off);
+  }
+  // theta_of() again: a step may have changed the sign of a diagonal.
+  best.theta = theta_of(lower_triangle(best.theta, q));
+  for (const Index k : diagonal(q)) best.theta(k) = std::fabs(best.theta(k));
+  best.point = reml_point(data, coding, best.theta, true);
+  best.converged = best.converged && way_off_boundary(best, coding, q).isZero(0);
+  return best;
+}
+
+/// Moment estimate of Psi: covariance of participants' means minus the part of residual variance.
+MatrixXd by_moments(const RemlStatistics& data) {
+  const Index q = data.levels;
+  const RemlPoint flat =
+      reml_point(data, MatrixXd::Identity(q, q), VectorXd::Zero(q * (q + 1) / 2), false);
+  const double within = std::max(1e-300, (data.yy - 2 * flat.beta.dot(data.xy) +
+                                          flat.beta.dot(data.within.cwiseProduct(flat.beta))) /
+                                             std::max(1.0, data.degrees_of_freedom));
+  MatrixXd products = MatrixXd::Zero(q, q), pairs = products, noise = products;
+  for (const RemlParticipant& group : data.groups) {
+    const VectorXd rest = group.y - group.x * flat.beta;
+    products(group.levels, group.levels) += rest * rest.transpose();
+    pairs(group.levels, group.levels).array() += 1;
+    for (Index i = 0; i < group.counts.size(); ++i) {
+      const Index level = group.levels[static_cast<std::size_t>(i)];
+      noise(level, level) += 1 / group.counts(i);
+    }
+  }
+  const MatrixXd raw = (products / within - noise).cwiseQuotient(pairs.cwiseMax(1));
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(raw);
+  const double floor = 1e-3 * std::max(eigen.eigenvalues().maxCoeff(), 1e-2);
+  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(floor).asDiagonal() *
+         eigen.eigenvectors().transpose();
+}
+
+/// Matrices of a participant at a given Psi.
+struct Part {
+  MatrixXd k;  // (counts^-1 + Psi)^-1 = Z'V^-1 Z
+  MatrixXd f;  // K x = Z'V^-1 X
+  VectorXd u;  // K (y - x beta)
+};
+
+MatrixXd rows_and_columns(const MatrixXd& all, const std::vector<Index>& which) {
+  return all(which, which);
+}
+
+/// Row and column in Lambda of each theta (lower triangle by columns).
+std::vector<std::pair<Index, Index>> lower_triangle_entries(Index levels) {
+  std::vector<std::pair<Index, Index>> out;
+  for (Index column = 0; column < levels; ++column) {
+    for (Index row = column; row < levels; ++row) out.emplace_back(row, column);
+  }
+  return out;
+}
+
+/// Sums over participants of quadratic forms with E, a direction of Psi at the participant's
+/// levels.
+struct Sums {
+  MatrixXd loss;   // F' E F
+  VectorXd mixed;  // F' E u
+  double squares;  // u' E u
+  double traces;   // tr(E (K - F C F'))
+};
+
+void put_derivatives(const RemlStatistics& data, const MatrixXd& coding, const VectorXd& theta,
+                     const std::vector<Part>& parts, double y_p_y, RemlPoint& out) {
+  const Index q = data.levels, p = out.beta.size();
+  const double degrees_of_freedom = data.degrees_of_freedom;
+  const MatrixXd lambda = lower_triangle(theta, q);
+  const MatrixXd& c = out.inverse_xx;
+  const auto entries = lower_triangle_entries(q);
+  const std::size_t n_theta = entries.size();
+
+  std::vector<MatrixXd> unit(n_theta), direction(n_theta);  // d Lambda and d Psi by each theta
+  for (std::size_t k = 0; k < n_theta; ++k) {
+    unit[k] = MatrixXd::Zero(q, q);
+    unit[k](entries[k].first, entries[k].second) = 1;
+    const MatrixXd half = coding * unit[k] * lambda.transpose() * coding.transpose();
+    direction[k] = half + half.transpose();
+  }
+
+  out.slope = MatrixXd::Zero(q, q);
+  std::vector<Sums> sums(n_theta, {{}, VectorXd::Zero(p), 0, 0});
+  MatrixXd second_trace = MatrixXd::Zero(static_cast<Index>(n_theta), static_cast<Index>(n_theta));
+  MatrixXd second_squares = second_trace;  // first term of the second derivative of u' E u
+  Index n_rows = 0;
+  for (const Part& part : parts) n_rows += part.f.rows();
+  // F and E F of all participants stacked: one large matrix product is faster than many small ones.
+  MatrixXd all_f(n_rows, p);
+  std::vector<MatrixXd> all_ef(n_theta, MatrixXd(n_rows, p));
+  for (std::size_t i = 0, row = 0; i < parts.size(); row += data.groups[i++].levels.size()) {
+    const Part& part = parts[i];
+    const auto& levels = data.groups[i].levels;
+    const auto rows = Eigen::seqN(static_cast<Index>(row), part.f.rows());
+    all_f(rows, Eigen::all) = part.f;
+    const MatrixXd fixed = part.f * c * part.f.transpose();
+    const MatrixXd gap = part.k - fixed;
+    out.slope(levels, levels) += gap - part.u * part.u.transpose() * (degrees_of_freedom / y_p_y);
+    std::vector<MatrixXd> e(n_theta), ke(n_theta);
+    for (std::size_t k = 0; k < n_theta; ++k) {
+      e[k] = rows_and_columns(direction[k], levels);
+      ke[k] = part.k * e[k];
+      all_ef[k](rows, Eigen::all) = e[k] * part.f;
+      sums[k].mixed.noalias() += part.f.transpose() * (e[k] * part.u);
+      sums[k].squares += part.u.dot(e[k] * part.u);
+      sums[k].traces += gap.cwiseProduct(e[k]).sum();
+    }
+    for (std::size_t k = 0; k < n_theta; ++k) {
+      for (std::size_t l = 0; l <= k; ++l) {
+        const auto a = static_cast<Index>(k), b = static_cast<Index>(l);
+        second_trace(a, b) += -(ke[k].transpose().cwiseProduct(ke[l])).sum() +
+                              2 * fixed.cwiseProduct(e[k] * ke[l]).sum();
+        second_squares(a, b) -= 2 * part.u.dot(e[k] * (ke[l] * part.u));
+      }
+    }
+  }
+
+  const auto m = static_cast<Index>(n_theta);
+  out.gradient.resize(m);
+  out.hessian.resize(m, m);
+  out.full_hessian.resize(m + 1, m + 1);
+  std::vector<MatrixXd> c_loss(n_theta);
+  for (std::size_t k = 0; k < n_theta; ++k) {
+    sums[k].loss.noalias() = all_f.transpose() * all_ef[k];
+    c_loss[k].noalias() = c * sums[k].loss;
+  }
+  const double sigma = std::sqrt(out.sigma_squared);
+  for (std::size_t k = 0; k < n_theta; ++k) {
+    const auto a = static_cast<Index>(k);
+    out.gradient(a) = sums[k].traces - degrees_of_freedom * sums[k].squares / y_p_y;
+    for (std::size_t l = 0; l <= k; ++l) {
+      const auto b = static_cast<Index>(l);
+      const double traces =
+          second_trace(a, b) - c_loss[k].transpose().cwiseProduct(c_loss[l]).sum();
+      const double squares = second_squares(a, b) + 2 * sums[k].mixed.dot(c * sums[l].mixed);
+      const MatrixXd bend = coding *
+                            (unit[k] * unit[l].transpose() + unit[l] * unit[k].transpose()) *
+                            coding.transpose();
+      const double curved = out.slope.cwiseProduct(bend).sum();
+      out.full_hessian(a, b) = out.full_hessian(b, a) =
+          traces - squares / out.sigma_squared + curved;
+      out.hessian(a, b) = out.hessian(b, a) =
+          traces -
+          degrees_of_freedom *
+              (squares / y_p_y + sums[k].squares * sums[l].squares / y_p_y / y_p_y) +
+          curved;
+    }
+    out.full_hessian(a, m) = out.full_hessian(m, a) =
+        2 * sums[k].squares / (sigma * out.sigma_squared);
+  }
+  out.full_hessian(m, m) = 4 * degrees_of_freedom / out.sigma_squared;
+  for (Sums& sum : sums) out.information_loss.push_back(std::move(sum.loss));
 }
 
 }  // namespace
@@ -235,164 +503,6 @@ ReducedModel::ReducedModel(const ParticipantCells& participant_cells, const Mode
   least_square = data.yy;
 }
 
-namespace {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
-constexpr int kMaxSteps = 200;
-// Participants. With more, the criterion had a single minimum in all tests: two starting values
-// suffice as a check.
-constexpr std::size_t kFew = 500;
-constexpr double kOnBoundary = 1e-4;  // threshold of a diagonal theta, as in lme4's isSingular()
-
-/// Lambda's lower triangle with a diagonal >= 0 from any root of Lambda Lambda'.
-VectorXd theta_of(const MatrixXd& root) {
-  const Index q = root.rows();
-  const MatrixXd r =
-      MatrixXd(root.transpose()).householderQr().matrixQR().triangularView<Eigen::Upper>();
-  VectorXd theta(q * (q + 1) / 2);
-  Index k = 0;
-  for (Index column = 0; column < q; ++column) {
-    const double sign = r(column, column) < 0 ? -1 : 1;
-    for (Index row = column; row < q; ++row) theta(k++) = sign * r(column, row);
-  }
-  return theta;
-}
-
-std::vector<Index> diagonal(Index q) {
-  std::vector<Index> out;
-  for (Index column = 0, k = 0; column < q; k += q - column++) out.push_back(k);
-  return out;
-}
-
-/// Newton step with the absolute values of the Hessian's eigenvalues: a descent direction.
-VectorXd newton_step(const RemlPoint& point) {
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(point.hessian);
-  const VectorXd curvature = eigen.eigenvalues().cwiseAbs();
-  const double floor = 1e-10 * std::max(curvature.maxCoeff(), 1e-10);
-  return -eigen.eigenvectors() * (eigen.eigenvectors().transpose() * point.gradient)
-                                     .cwiseQuotient(curvature.cwiseMax(floor));
-}
-
-/// Rounding error of the deviance, larger for large effects with a small residual.
-double rounding(const RemlOptimum& at) {
-  return std::min(
-      1e-6, 1e-13 * std::max(1.0, std::fabs(at.point.deviance)) * (1 + at.theta.squaredNorm()));
-}
-
-/// Descends from theta until the gradient vanishes. The criterion is even in a diagonal theta, so a
-/// starting value on the boundary stays there.
-RemlOptimum descend(const RemlStatistics& data, const MatrixXd& coding, VectorXd theta) {
-  RemlOptimum out;
-  out.theta = std::move(theta);
-  out.point = reml_point(data, coding, out.theta, true);
-  for (int i = 0; i < kMaxSteps; ++i) {
-    const VectorXd step = newton_step(out.point);
-    const double promised = -step.dot(out.point.gradient);
-    const double noise = rounding(out);
-    const double longest = 1 + out.theta.norm();
-    double length = std::min(1.0, longest / step.norm());
-    RemlPoint next;
-    bool lower = false;
-    for (int halved = 0; halved < 40 && !lower; ++halved, length /= 2) {
-      next = reml_point(data, coding, out.theta + length * step, true);
-      lower = next.deviance <= out.point.deviance - 1e-4 * length * promised + noise;
-      if (lower) out.theta += length * step;
-    }
-    if (!lower) break;
-    // Near the minimum the deviance is constant up to rounding: a step is accepted if it reduces
-    // the gradient.
-    const bool done = promised < noise && next.gradient.norm() >= 0.5 * out.point.gradient.norm();
-    out.point = std::move(next);
-    if (promised < noise) out.converged = true;
-    if (done || promised == 0) break;
-  }
-  return out;
-}
-
-/// Among the directions in which Psi is 0, that of steepest descent; none: the Karush-Kuhn-Tucker
-/// conditions hold.
-VectorXd way_off_boundary(const RemlOptimum& at, const MatrixXd& coding, Index q) {
-  const MatrixXd lambda = lower_triangle(at.theta, q);
-  const MatrixXd slope = coding.transpose() * at.point.slope * coding;  // by Lambda Lambda'
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> psi(lambda * lambda.transpose());
-  std::vector<Index> null;
-  for (Index i = 0; i < q; ++i) {
-    if (psi.eigenvalues()(i) <= kOnBoundary * kOnBoundary) null.push_back(i);
-  }
-  if (null.empty()) return VectorXd::Zero(q);
-  const MatrixXd basis = psi.eigenvectors()(Eigen::all, null);
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> reduced(basis.transpose() * slope * basis);
-  const double scale = 1e-9 * std::max(1.0, slope.norm());
-  if (reduced.eigenvalues()(0) >= -scale) return VectorXd::Zero(q);
-  return basis * reduced.eigenvectors().col(0);
-}
-
-VectorXd with_small_diagonals_at_zero(VectorXd theta, Index q) {
-  for (const Index k : diagonal(q)) {
-    if (std::fabs(theta(k)) < kOnBoundary) theta(k) = 0;
-  }
-  return theta;
-}
-
-/// descend(), then leaves the boundary if that lowers the deviance, and sets parameters near 0 to
-/// exactly 0.
-RemlOptimum optimum_from(const RemlStatistics& data, const MatrixXd& coding,
-                         const VectorXd& start) {
-  const Index q = data.levels;
-  RemlOptimum best = descend(data, coding, start);
-  for (int i = 0; i < 10; ++i) {
-    best.theta = theta_of(lower_triangle(best.theta, q));
-    const VectorXd snapped = with_small_diagonals_at_zero(best.theta, q);
-    if (snapped != best.theta || !best.converged) {
-      RemlOptimum on = descend(data, coding, snapped);
-      if (on.point.deviance <= best.point.deviance + 1e-8) best = std::move(on);
-    }
-    const VectorXd away = way_off_boundary(best, coding, q);
-    if (away.isZero(0)) break;
-    MatrixXd root(q, q + 1);
-    root << lower_triangle(best.theta, q), 0.1 * away;
-    RemlOptimum off = descend(data, coding, theta_of(root));
-    if (off.point.deviance >= best.point.deviance) break;
-    best = std::move(off);
-  }
-  // theta_of() again: a step may have changed the sign of a diagonal.
-  best.theta = theta_of(lower_triangle(best.theta, q));
-  for (const Index k : diagonal(q)) best.theta(k) = std::fabs(best.theta(k));
-  best.point = reml_point(data, coding, best.theta, true);
-  best.converged = best.converged && way_off_boundary(best, coding, q).isZero(0);
-  return best;
-}
-
-/// Moment estimate of Psi: covariance of participants' means minus the part of residual variance.
-MatrixXd by_moments(const RemlStatistics& data) {
-  const Index q = data.levels;
-  const RemlPoint flat =
-      reml_point(data, MatrixXd::Identity(q, q), VectorXd::Zero(q * (q + 1) / 2), false);
-  const double within = std::max(1e-300, (data.yy - 2 * flat.beta.dot(data.xy) +
-                                          flat.beta.dot(data.within.cwiseProduct(flat.beta))) /
-                                             std::max(1.0, data.degrees_of_freedom));
-  MatrixXd products = MatrixXd::Zero(q, q), pairs = products, noise = products;
-  for (const RemlParticipant& group : data.groups) {
-    const VectorXd rest = group.y - group.x * flat.beta;
-    products(group.levels, group.levels) += rest * rest.transpose();
-    pairs(group.levels, group.levels).array() += 1;
-    for (Index i = 0; i < group.counts.size(); ++i) {
-      const Index level = group.levels[static_cast<std::size_t>(i)];
-      noise(level, level) += 1 / group.counts(i);
-    }
-  }
-  const MatrixXd raw = (products / within - noise).cwiseQuotient(pairs.cwiseMax(1));
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(raw);
-  const double floor = 1e-3 * std::max(eigen.eigenvalues().maxCoeff(), 1e-2);
-  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(floor).asDiagonal() *
-         eigen.eigenvectors().transpose();
-}
-
-}  // namespace
-
 RemlOptimum reml_optimum(const RemlStatistics& data, const MatrixXd& coding) {
   const Index q = data.levels;
   const MatrixXd inverse = coding.inverse();
@@ -418,133 +528,6 @@ RemlOptimum reml_optimum(const RemlStatistics& data, const MatrixXd& coding) {
   }
   return best;
 }
-
-namespace {
-
-using Eigen::Index;
-using Eigen::MatrixXd;
-using Eigen::VectorXd;
-
-/// Matrices of a participant at a given Psi.
-struct Part {
-  MatrixXd k;  // (counts^-1 + Psi)^-1 = Z'V^-1 Z
-  MatrixXd f;  // K x = Z'V^-1 X
-  VectorXd u;  // K (y - x beta)
-};
-
-MatrixXd rows_and_columns(const MatrixXd& all, const std::vector<Index>& which) {
-  return all(which, which);
-}
-
-/// Row and column in Lambda of each theta (lower triangle by columns).
-std::vector<std::pair<Index, Index>> lower_triangle_entries(Index levels) {
-  std::vector<std::pair<Index, Index>> out;
-  for (Index column = 0; column < levels; ++column) {
-    for (Index row = column; row < levels; ++row) out.emplace_back(row, column);
-  }
-  return out;
-}
-
-/// Sums over participants of quadratic forms with E, a direction of Psi at the participant's
-/// levels.
-struct Sums {
-  MatrixXd loss;   // F' E F
-  VectorXd mixed;  // F' E u
-  double squares;  // u' E u
-  double traces;   // tr(E (K - F C F'))
-};
-
-void put_derivatives(const RemlStatistics& data, const MatrixXd& coding, const VectorXd& theta,
-                     const std::vector<Part>& parts, double y_p_y, RemlPoint& out) {
-  const Index q = data.levels, p = out.beta.size();
-  const double degrees_of_freedom = data.degrees_of_freedom;
-  const MatrixXd lambda = lower_triangle(theta, q);
-  const MatrixXd& c = out.inverse_xx;
-  const auto entries = lower_triangle_entries(q);
-  const std::size_t n_theta = entries.size();
-
-  std::vector<MatrixXd> unit(n_theta), direction(n_theta);  // d Lambda and d Psi by each theta
-  for (std::size_t k = 0; k < n_theta; ++k) {
-    unit[k] = MatrixXd::Zero(q, q);
-    unit[k](entries[k].first, entries[k].second) = 1;
-    const MatrixXd half = coding * unit[k] * lambda.transpose() * coding.transpose();
-    direction[k] = half + half.transpose();
-  }
-
-  out.slope = MatrixXd::Zero(q, q);
-  std::vector<Sums> sums(n_theta, {{}, VectorXd::Zero(p), 0, 0});
-  MatrixXd second_trace = MatrixXd::Zero(static_cast<Index>(n_theta), static_cast<Index>(n_theta));
-  MatrixXd second_squares = second_trace;  // first term of the second derivative of u' E u
-  Index n_rows = 0;
-  for (const Part& part : parts) n_rows += part.f.rows();
-  // F and E F of all participants stacked: one large matrix product is faster than many small ones.
-  MatrixXd all_f(n_rows, p);
-  std::vector<MatrixXd> all_ef(n_theta, MatrixXd(n_rows, p));
-  for (std::size_t i = 0, row = 0; i < parts.size(); row += data.groups[i++].levels.size()) {
-    const Part& part = parts[i];
-    const auto& levels = data.groups[i].levels;
-    const auto rows = Eigen::seqN(static_cast<Index>(row), part.f.rows());
-    all_f(rows, Eigen::all) = part.f;
-    const MatrixXd fixed = part.f * c * part.f.transpose();
-    const MatrixXd gap = part.k - fixed;
-    out.slope(levels, levels) += gap - part.u * part.u.transpose() * (degrees_of_freedom / y_p_y);
-    std::vector<MatrixXd> e(n_theta), ke(n_theta);
-    for (std::size_t k = 0; k < n_theta; ++k) {
-      e[k] = rows_and_columns(direction[k], levels);
-      ke[k] = part.k * e[k];
-      all_ef[k](rows, Eigen::all) = e[k] * part.f;
-      sums[k].mixed.noalias() += part.f.transpose() * (e[k] * part.u);
-      sums[k].squares += part.u.dot(e[k] * part.u);
-      sums[k].traces += gap.cwiseProduct(e[k]).sum();
-    }
-    for (std::size_t k = 0; k < n_theta; ++k) {
-      for (std::size_t l = 0; l <= k; ++l) {
-        const auto a = static_cast<Index>(k), b = static_cast<Index>(l);
-        second_trace(a, b) += -(ke[k].transpose().cwiseProduct(ke[l])).sum() +
-                              2 * fixed.cwiseProduct(e[k] * ke[l]).sum();
-        second_squares(a, b) -= 2 * part.u.dot(e[k] * (ke[l] * part.u));
-      }
-    }
-  }
-
-  const auto m = static_cast<Index>(n_theta);
-  out.gradient.resize(m);
-  out.hessian.resize(m, m);
-  out.full_hessian.resize(m + 1, m + 1);
-  std::vector<MatrixXd> c_loss(n_theta);
-  for (std::size_t k = 0; k < n_theta; ++k) {
-    sums[k].loss.noalias() = all_f.transpose() * all_ef[k];
-    c_loss[k].noalias() = c * sums[k].loss;
-  }
-  const double sigma = std::sqrt(out.sigma_squared);
-  for (std::size_t k = 0; k < n_theta; ++k) {
-    const auto a = static_cast<Index>(k);
-    out.gradient(a) = sums[k].traces - degrees_of_freedom * sums[k].squares / y_p_y;
-    for (std::size_t l = 0; l <= k; ++l) {
-      const auto b = static_cast<Index>(l);
-      const double traces =
-          second_trace(a, b) - c_loss[k].transpose().cwiseProduct(c_loss[l]).sum();
-      const double squares = second_squares(a, b) + 2 * sums[k].mixed.dot(c * sums[l].mixed);
-      const MatrixXd bend = coding *
-                            (unit[k] * unit[l].transpose() + unit[l] * unit[k].transpose()) *
-                            coding.transpose();
-      const double curved = out.slope.cwiseProduct(bend).sum();
-      out.full_hessian(a, b) = out.full_hessian(b, a) =
-          traces - squares / out.sigma_squared + curved;
-      out.hessian(a, b) = out.hessian(b, a) =
-          traces -
-          degrees_of_freedom *
-              (squares / y_p_y + sums[k].squares * sums[l].squares / y_p_y / y_p_y) +
-          curved;
-    }
-    out.full_hessian(a, m) = out.full_hessian(m, a) =
-        2 * sums[k].squares / (sigma * out.sigma_squared);
-  }
-  out.full_hessian(m, m) = 4 * degrees_of_freedom / out.sigma_squared;
-  for (Sums& sum : sums) out.information_loss.push_back(std::move(sum.loss));
-}
-
-}  // namespace
 
 MatrixXd lower_triangle(const VectorXd& theta, Index levels) {
   MatrixXd lambda = MatrixXd::Zero(levels, levels);

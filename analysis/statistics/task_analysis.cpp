@@ -59,84 +59,6 @@ StevensLine line_of(std::size_t participant, const LogsByLevel& logs) {
   return line;
 }
 
-}  // namespace
-
-MagnitudeEstimation magnitude_estimation(const std::vector<MagnitudeTrial>& trials, bool modulus) {
-  MagnitudeEstimation result;
-  std::map<std::size_t, LogsByLevel> by_participant;
-  for (const MagnitudeTrial& trial : trials) {
-    if (trial.level > 0 && trial.magnitude > 0) {
-      by_participant[trial.participant][trial.level].push_back(std::log10(trial.magnitude));
-    } else {
-      ++result.without_logarithm;
-    }
-  }
-  std::vector<double> exponents, centres;
-  for (const auto& [participant, logs] : by_participant) {
-    result.lines.push_back(line_of(participant, logs));
-    if (result.lines.back().exponent) exponents.push_back(*result.lines.back().exponent);
-    std::vector<double> means;
-    for (const auto& [level, values] : logs) means.push_back(mean(values));
-    centres.push_back(mean(means));
-  }
-  if (!exponents.empty()) result.exponent = mean(exponents);
-  result.exponent_ci95 = mean_interval(exponents);
-
-  std::map<double, std::vector<double>> by_level;
-  std::size_t i = 0;
-  for (const auto& [participant, logs] : by_participant) {
-    const double shift = modulus ? 0 : mean(centres) - centres[i];
-    ++i;
-    for (const auto& [level, values] : logs) by_level[level].push_back(mean(values) + shift);
-  }
-  for (const auto& [level, values] : by_level) {
-    MagnitudeMean one{level, std::pow(10, mean(values)), std::nullopt, values.size()};
-    if (const auto ends = mean_interval(values))
-      one.ci95 = Interval{std::pow(10, ends->low), std::pow(10, ends->high)};
-    result.means.push_back(one);
-  }
-  return result;
-}
-
-std::vector<Adjustment> adjustments(const std::vector<AdjustmentTrial>& trials) {
-  std::map<std::size_t, std::vector<AdjustmentTrial>> by_participant;
-  for (const AdjustmentTrial& trial : trials) by_participant[trial.participant].push_back(trial);
-  std::vector<Adjustment> results;
-  for (const auto& [participant, own] : by_participant) {
-    std::vector<double> all, above, below;
-    for (const AdjustmentTrial& trial : own) {
-      all.push_back(trial.setting);
-      (trial.from_above ? above : below).push_back(trial.setting);
-    }
-    Adjustment result;
-    result.participant = participant;
-    result.settings = all.size();
-    result.pse = mean(all);
-    result.pse_ci95 = mean_interval(all);
-    const bool all_above_zero = std::all_of(own.begin(), own.end(), [](const auto& trial) {
-      return trial.setting > 0 && trial.standard > 0;
-    });
-    if (result.pse_ci95 && all_above_zero)
-      result.pse_ci95->low = std::max(0.0, result.pse_ci95->low);
-    result.constant_error = result.pse - own.front().standard;
-    if (!above.empty() && !below.empty()) result.start_effect = mean(above) - mean(below);
-    double squares = 0, df = 0;
-    for (const auto* group : {&above, &below}) {
-      if (group->empty()) continue;
-      for (const double setting : *group) squares += std::pow(setting - mean(*group), 2);
-      df += static_cast<double>(group->size()) - 1;
-    }
-    if (df > 0) {
-      result.sd = std::sqrt(squares / df);
-      result.jnd = 0.6744897501960817 * *result.sd;
-    }
-    results.push_back(result);
-  }
-  return results;
-}
-
-namespace {
-
 using CountTable = std::vector<std::vector<std::size_t>>;
 
 struct Margins {
@@ -201,35 +123,6 @@ double jackknife_error(const CountTable& counts, const Margins& sums, double cel
   return std::sqrt((sums.total - 1) / sums.total * deviation);
 }
 
-}  // namespace
-
-InformationTransfer information_transfer(const CountTable& counts) {
-  InformationTransfer result;
-  const Margins sums = margins_of(counts);
-  result.trials = static_cast<std::size_t>(sums.total);
-  if (sums.total == 0) {
-    result.undefined = "no answers";
-    return result;
-  }
-  double cells = 0;
-  for (const auto& row : counts) {
-    for (const std::size_t n : row) cells += nlogn(static_cast<double>(n));
-  }
-  const double rows = sum_nlogn(sums.rows), columns = sum_nlogn(sums.columns);
-  result.stimulus_entropy = (nlogn(sums.total) - rows) / sums.total;
-  result.plain = std::max(0.0, transfer(cells, rows, columns, sums.total));
-  const double extra = static_cast<double>(sums.cells) - static_cast<double>(filled(sums.rows)) -
-                       static_cast<double>(filled(sums.columns)) + 1;
-  // With few errors few cells beyond the diagonal are filled and `extra` is below 0, but counts of
-  // a sample never transmit too little on average.
-  result.corrected = *result.plain - std::max(0.0, extra) / (2 * sums.total * std::log(2.0));
-  result.categories = std::exp2(std::max(0.0, *result.corrected));
-  if (sums.total > 1) result.se = jackknife_error(counts, sums, cells, rows, columns);
-  return result;
-}
-
-namespace {
-
 /// A staircase moves one way after a success, if at all, and the other way after a failure; any
 /// other track is not a staircase.
 std::vector<std::size_t> reversals_of(const Track& track) {
@@ -293,84 +186,6 @@ void replay(Track& track, const TaskTrial& trial, const TaskTable& table,
   if (staircase != nullptr) result.target = protocols::convergence_point(*staircase);
   track.procedure = std::move(result);
 }
-
-}  // namespace
-
-const protocols::BlockProcedures* block_of(const TaskTrial& trial, const TaskTable& table) {
-  const auto protocol = table.procedures.find(trial.protocol_sha256);
-  if (protocol == table.procedures.end()) return nullptr;
-  const auto block = protocol->second.find(trial.block_name);
-  return block == protocol->second.end() ? nullptr : &block->second;
-}
-
-const char* kind_of(const protocols::ProcedureSpec& spec) {
-  if (std::holds_alternative<protocols::Staircase>(spec)) return "staircase";
-  if (std::holds_alternative<protocols::QuestPlus>(spec)) return "quest_plus";
-  return std::holds_alternative<protocols::Limits>(spec) ? "limits" : "constant";
-}
-
-std::optional<protocols::LevelScale> scale_of_adaptive(const protocols::ProcedureSpec& spec) {
-  if (const auto* staircase = std::get_if<protocols::Staircase>(&spec)) return staircase->scale;
-  if (const auto* quest = std::get_if<protocols::QuestPlus>(&spec)) return quest->function.scale;
-  if (const auto* limits = std::get_if<protocols::Limits>(&spec)) return limits->scale;
-  return std::nullopt;
-}
-
-std::optional<protocols::Easier> easier_of_adaptive(const protocols::ProcedureSpec& spec) {
-  if (const auto* staircase = std::get_if<protocols::Staircase>(&spec)) return staircase->easier;
-  if (const auto* quest = std::get_if<protocols::QuestPlus>(&spec)) return quest->function.easier;
-  if (const auto* limits = std::get_if<protocols::Limits>(&spec)) return limits->easier;
-  return std::nullopt;
-}
-
-const std::vector<protocols::ProcedureSpec>& specs_of(const TaskTrial& trial,
-                                                      const TaskTable& table) {
-  static const std::vector<protocols::ProcedureSpec> kNone;
-  const protocols::BlockProcedures* const block = block_of(trial, table);
-  return block == nullptr ? kNone : block->specs;
-}
-
-std::vector<Track> tracks_of(const std::vector<const TaskTrial*>& trials, const TaskTable& table) {
-  std::map<std::string, std::vector<const TaskTrial*>> named;
-  for (const TaskTrial* trial : trials) {
-    if (trial->level && !trial->catch_trial && trial->answered)
-      named[trial->track].push_back(trial);
-  }
-  std::vector<Track> tracks;
-  for (const auto& [name, own] : named) {
-    if (own.size() < 2) continue;
-    Track track;
-    track.name = name;
-    for (const TaskTrial* trial : own) {
-      track.levels.push_back(*trial->level);
-      track.successes.push_back(trial->success);
-    }
-    int number = 0;
-    if (const auto* spec = spec_of(track, *own.front(), table, number)) {
-      replay(track, *own.front(), table, *spec, number);
-    } else {
-      track.reversals = reversals_of(track);
-    }
-    tracks.push_back(std::move(track));
-  }
-  std::sort(tracks.begin(), tracks.end(), [](const Track& a, const Track& b) {
-    return std::pair(a.name.size(), a.name) < std::pair(b.name.size(), b.name);  // as numbers
-  });
-  return tracks;
-}
-
-void add_fitted_levels(std::vector<Track>& tracks, const PsychometricModel& model,
-                       const PsychometricFit& fit) {
-  const auto& [threshold, slope, guess, lapse] = fit.parameters;
-  for (Track& track : tracks) {
-    if (!track.procedure || !track.procedure->target) continue;
-    const double share = (*track.procedure->target - guess) / (1 - guess - lapse);
-    if (share > 0 && share < 1)
-      track.procedure->fitted_level = psychometric_level(model.function, fit.parameters, share);
-  }
-}
-
-namespace {
 
 using protocols::LevelScale;
 using Trials = std::vector<const TaskTrial*>;
@@ -758,6 +573,179 @@ TaskCell cell_of(const CellKey& key, const Trials& trials, const Context& contex
 }
 
 }  // namespace
+
+MagnitudeEstimation magnitude_estimation(const std::vector<MagnitudeTrial>& trials, bool modulus) {
+  MagnitudeEstimation result;
+  std::map<std::size_t, LogsByLevel> by_participant;
+  for (const MagnitudeTrial& trial : trials) {
+    if (trial.level > 0 && trial.magnitude > 0) {
+      by_participant[trial.participant][trial.level].push_back(std::log10(trial.magnitude));
+    } else {
+      ++result.without_logarithm;
+    }
+  }
+  std::vector<double> exponents, centres;
+  for (const auto& [participant, logs] : by_participant) {
+    result.lines.push_back(line_of(participant, logs));
+    if (result.lines.back().exponent) exponents.push_back(*result.lines.back().exponent);
+    std::vector<double> means;
+    for (const auto& [level, values] : logs) means.push_back(mean(values));
+    centres.push_back(mean(means));
+  }
+  if (!exponents.empty()) result.exponent = mean(exponents);
+  result.exponent_ci95 = mean_interval(exponents);
+
+  std::map<double, std::vector<double>> by_level;
+  std::size_t i = 0;
+  for (const auto& [participant, logs] : by_participant) {
+    const double shift = modulus ? 0 : mean(centres) - centres[i];
+    ++i;
+    for (const auto& [level, values] : logs) by_level[level].push_back(mean(values) + shift);
+  }
+  for (const auto& [level, values] : by_level) {
+    MagnitudeMean one{level, std::pow(10, mean(values)), std::nullopt, values.size()};
+    if (const auto ends = mean_interval(values))
+      one.ci95 = Interval{std::pow(10, ends->low), std::pow(10, ends->high)};
+    result.means.push_back(one);
+  }
+  return result;
+}
+
+std::vector<Adjustment> adjustments(const std::vector<AdjustmentTrial>& trials) {
+  std::map<std::size_t, std::vector<AdjustmentTrial>> by_participant;
+  for (const AdjustmentTrial& trial : trials) by_participant[trial.participant].push_back(trial);
+  std::vector<Adjustment> results;
+  for (const auto& [participant, own] : by_participant) {
+    std::vector<double> all, above, below;
+    for (const AdjustmentTrial& trial : own) {
+      all.push_back(trial.setting);
+      (trial.from_above ? above : below).push_back(trial.setting);
+    }
+    Adjustment result;
+    result.participant = participant;
+    result.settings = all.size();
+    result.pse = mean(all);
+    result.pse_ci95 = mean_interval(all);
+    const bool all_above_zero = std::all_of(own.begin(), own.end(), [](const auto& trial) {
+      return trial.setting > 0 && trial.standard > 0;
+    });
+    if (result.pse_ci95 && all_above_zero)
+      result.pse_ci95->low = std::max(0.0, result.pse_ci95->low);
+    result.constant_error = result.pse - own.front().standard;
+    if (!above.empty() && !below.empty()) result.start_effect = mean(above) - mean(below);
+    double squares = 0, df = 0;
+    for (const auto* group : {&above, &below}) {
+      if (group->empty()) continue;
+      for (const double setting : *group) squares += std::pow(setting - mean(*group), 2);
+      df += static_cast<double>(group->size()) - 1;
+    }
+    if (df > 0) {
+      result.sd = std::sqrt(squares / df);
+      result.jnd = 0.6744897501960817 * *result.sd;
+    }
+    results.push_back(result);
+  }
+  return results;
+}
+
+InformationTransfer information_transfer(const CountTable& counts) {
+  InformationTransfer result;
+  const Margins sums = margins_of(counts);
+  result.trials = static_cast<std::size_t>(sums.total);
+  if (sums.total == 0) {
+    result.undefined = "no answers";
+    return result;
+  }
+  double cells = 0;
+  for (const auto& row : counts) {
+    for (const std::size_t n : row) cells += nlogn(static_cast<double>(n));
+  }
+  const double rows = sum_nlogn(sums.rows), columns = sum_nlogn(sums.columns);
+  result.stimulus_entropy = (nlogn(sums.total) - rows) / sums.total;
+  result.plain = std::max(0.0, transfer(cells, rows, columns, sums.total));
+  const double extra = static_cast<double>(sums.cells) - static_cast<double>(filled(sums.rows)) -
+                       static_cast<double>(filled(sums.columns)) + 1;
+  // With few errors few cells beyond the diagonal are filled and `extra` is below 0, but counts of
+  // a sample never transmit too little on average.
+  result.corrected = *result.plain - std::max(0.0, extra) / (2 * sums.total * std::log(2.0));
+  result.categories = std::exp2(std::max(0.0, *result.corrected));
+  if (sums.total > 1) result.se = jackknife_error(counts, sums, cells, rows, columns);
+  return result;
+}
+
+const protocols::BlockProcedures* block_of(const TaskTrial& trial, const TaskTable& table) {
+  const auto protocol = table.procedures.find(trial.protocol_sha256);
+  if (protocol == table.procedures.end()) return nullptr;
+  const auto block = protocol->second.find(trial.block_name);
+  return block == protocol->second.end() ? nullptr : &block->second;
+}
+
+const char* kind_of(const protocols::ProcedureSpec& spec) {
+  if (std::holds_alternative<protocols::Staircase>(spec)) return "staircase";
+  if (std::holds_alternative<protocols::QuestPlus>(spec)) return "quest_plus";
+  return std::holds_alternative<protocols::Limits>(spec) ? "limits" : "constant";
+}
+
+std::optional<protocols::LevelScale> scale_of_adaptive(const protocols::ProcedureSpec& spec) {
+  if (const auto* staircase = std::get_if<protocols::Staircase>(&spec)) return staircase->scale;
+  if (const auto* quest = std::get_if<protocols::QuestPlus>(&spec)) return quest->function.scale;
+  if (const auto* limits = std::get_if<protocols::Limits>(&spec)) return limits->scale;
+  return std::nullopt;
+}
+
+std::optional<protocols::Easier> easier_of_adaptive(const protocols::ProcedureSpec& spec) {
+  if (const auto* staircase = std::get_if<protocols::Staircase>(&spec)) return staircase->easier;
+  if (const auto* quest = std::get_if<protocols::QuestPlus>(&spec)) return quest->function.easier;
+  if (const auto* limits = std::get_if<protocols::Limits>(&spec)) return limits->easier;
+  return std::nullopt;
+}
+
+const std::vector<protocols::ProcedureSpec>& specs_of(const TaskTrial& trial,
+                                                      const TaskTable& table) {
+  static const std::vector<protocols::ProcedureSpec> kNone;
+  const protocols::BlockProcedures* const block = block_of(trial, table);
+  return block == nullptr ? kNone : block->specs;
+}
+
+std::vector<Track> tracks_of(const std::vector<const TaskTrial*>& trials, const TaskTable& table) {
+  std::map<std::string, std::vector<const TaskTrial*>> named;
+  for (const TaskTrial* trial : trials) {
+    if (trial->level && !trial->catch_trial && trial->answered)
+      named[trial->track].push_back(trial);
+  }
+  std::vector<Track> tracks;
+  for (const auto& [name, own] : named) {
+    if (own.size() < 2) continue;
+    Track track;
+    track.name = name;
+    for (const TaskTrial* trial : own) {
+      track.levels.push_back(*trial->level);
+      track.successes.push_back(trial->success);
+    }
+    int number = 0;
+    if (const auto* spec = spec_of(track, *own.front(), table, number)) {
+      replay(track, *own.front(), table, *spec, number);
+    } else {
+      track.reversals = reversals_of(track);
+    }
+    tracks.push_back(std::move(track));
+  }
+  std::sort(tracks.begin(), tracks.end(), [](const Track& a, const Track& b) {
+    return std::pair(a.name.size(), a.name) < std::pair(b.name.size(), b.name);  // as numbers
+  });
+  return tracks;
+}
+
+void add_fitted_levels(std::vector<Track>& tracks, const PsychometricModel& model,
+                       const PsychometricFit& fit) {
+  const auto& [threshold, slope, guess, lapse] = fit.parameters;
+  for (Track& track : tracks) {
+    if (!track.procedure || !track.procedure->target) continue;
+    const double share = (*track.procedure->target - guess) / (1 - guess - lapse);
+    if (share > 0 && share < 1)
+      track.procedure->fitted_level = psychometric_level(model.function, fit.parameters, share);
+  }
+}
 
 TaskAnalysis analyze_tasks(TaskTable table, const FunctionSettings& functions,
                            const AnalysisSettings& settings, const std::string& program_version) {

@@ -117,44 +117,6 @@ void add_mixed_model(ThresholdComparison& result, const ValuesByParticipant& val
   }
 }
 
-}  // namespace
-
-ThresholdComparison compare_thresholds(const std::vector<ParticipantFigure>& figures,
-                                       std::size_t conditions) {
-  ThresholdComparison result;
-  if (conditions < 2) {
-    result.undefined = "fewer than two conditions";
-    return result;
-  }
-  ValuesByParticipant values;
-  for (const ParticipantFigure& figure : figures)
-    values[figure.participant][figure.condition] = figure.value;
-  std::vector<std::optional<double>> p;
-  for (std::size_t condition = 1; condition < conditions; ++condition) {
-    std::vector<double> differences;
-    for (const auto& [participant, own] : values) {
-      if (own.count(0) > 0 && own.count(condition) > 0)
-        differences.push_back(own.at(condition) - own.at(0));
-    }
-    ConditionDifference difference;
-    difference.condition = condition;
-    difference.n_pairs = differences.size();
-    if (!differences.empty()) difference.mean = mean(differences);
-    difference.t_test = t_test(differences);
-    difference.effect_size = effect_size(differences);
-    difference.wilcoxon = wilcoxon(differences);
-    p.push_back(difference.t_test.p);
-    result.differences.push_back(std::move(difference));
-  }
-  const auto adjusted = holm(p);
-  for (std::size_t i = 0; i < adjusted.size(); ++i)
-    result.differences[i].t_test.p_holm = adjusted[i];
-  add_mixed_model(result, values, conditions);
-  return result;
-}
-
-namespace {
-
 struct Figures {
   std::vector<std::pair<std::string, double>> of;  ///< participant and figure
   std::size_t n_undetermined = 0;
@@ -406,6 +368,40 @@ void compare_rated_stimuli(const std::vector<const TaskCell*>& cells,
 }
 
 }  // namespace
+
+ThresholdComparison compare_thresholds(const std::vector<ParticipantFigure>& figures,
+                                       std::size_t conditions) {
+  ThresholdComparison result;
+  if (conditions < 2) {
+    result.undefined = "fewer than two conditions";
+    return result;
+  }
+  ValuesByParticipant values;
+  for (const ParticipantFigure& figure : figures)
+    values[figure.participant][figure.condition] = figure.value;
+  std::vector<std::optional<double>> p;
+  for (std::size_t condition = 1; condition < conditions; ++condition) {
+    std::vector<double> differences;
+    for (const auto& [participant, own] : values) {
+      if (own.count(0) > 0 && own.count(condition) > 0)
+        differences.push_back(own.at(condition) - own.at(0));
+    }
+    ConditionDifference difference;
+    difference.condition = condition;
+    difference.n_pairs = differences.size();
+    if (!differences.empty()) difference.mean = mean(differences);
+    difference.t_test = t_test(differences);
+    difference.effect_size = effect_size(differences);
+    difference.wilcoxon = wilcoxon(differences);
+    p.push_back(difference.t_test.p);
+    result.differences.push_back(std::move(difference));
+  }
+  const auto adjusted = holm(p);
+  for (std::size_t i = 0; i < adjusted.size(); ++i)
+    result.differences[i].t_test.p_holm = adjusted[i];
+  add_mixed_model(result, values, conditions);
+  return result;
+}
 
 std::string measure_plural(const std::string& measure) {
   if (measure == "threshold") return "Thresholds";

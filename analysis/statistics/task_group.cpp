@@ -23,18 +23,6 @@ std::string open_status(const std::string& undefined, bool low, bool high) {
   return !low ? "low open" : !high ? "high open" : "ok";
 }
 
-}  // namespace
-
-std::string TaskGroupModel::status() const {
-  return open_status(undefined, low.has_value(), high.has_value());
-}
-
-std::string TaskGroupComparison::status() const {
-  return open_status(undefined, low.has_value(), high.has_value());
-}
-
-namespace {
-
 using Cells = std::vector<const TaskCell*>;
 
 /// A block and stimulus with all its renderers, ready for the model.
@@ -73,6 +61,23 @@ GroupPsychometricModel model_of(const TaskCell& cell) {
   return model;
 }
 
+/// A measure of the model: which coordinate, and how it is shown.
+struct GroupMeasure {
+  const char* name;
+  GroupCoordinate coordinate;
+  bool ratio;         ///< comparisons are ratios
+  double factor = 1;  ///< of the shown value
+  bool with_unit = true;
+};
+
+/// Value of a coordinate in the unit of a measure.
+double shown(const GroupTask& task, const GroupMeasure& measure, double value) {
+  if (measure.coordinate == GroupCoordinate::first)
+    return measure.factor * group_level(task.model, value);
+  const bool log_scale = task.model.function.scale != protocols::LevelScale::linear;
+  return measure.factor * (log_scale ? std::expm1(std::exp(value)) : std::exp(value));
+}
+
 void add_answers(GroupTask& task, const TaskCell& cell) {
   std::vector<GroupAnswers> answers(task.participants.size());
   std::size_t reversed = 0;
@@ -99,6 +104,15 @@ void add_answers(GroupTask& task, const TaskCell& cell) {
   task.no_answers.push_back(std::move(none));
 }
 
+const TaskGroupModel* model_of(const std::vector<TaskGroupModel>& models, const TaskGroup& group,
+                               const std::string& renderer) {
+  const auto found = std::ranges::find_if(models, [&](const TaskGroupModel& one) {
+    return one.task == group.task && one.block_name == group.block_name &&
+           one.shape == group.shape && one.measure == group.measure && one.renderer == renderer;
+  });
+  return found == models.end() ? nullptr : &*found;
+}
+
 GroupTask task_of(const Cells& cells) {
   GroupTask task;
   task.cells = cells;
@@ -112,15 +126,6 @@ GroupTask task_of(const Cells& cells) {
   task.data = group_psychometric_data(task.answers, task.model);
   return task;
 }
-
-/// A measure of the model: which coordinate, and how it is shown.
-struct GroupMeasure {
-  const char* name;
-  GroupCoordinate coordinate;
-  bool ratio;         ///< comparisons are ratios
-  double factor = 1;  ///< of the shown value
-  bool with_unit = true;
-};
 
 std::vector<GroupMeasure> measures_of(const GroupTask& task) {
   const TaskCell& cell = *task.cells.front();
@@ -147,14 +152,6 @@ std::vector<GroupMeasure> measures_of(const GroupTask& task) {
     out.push_back(
         {"weber_fraction", GroupCoordinate::second, true, log_scale ? 1 : 1 / *standard, false});
   return out;
-}
-
-/// Value of a coordinate in the unit of a measure.
-double shown(const GroupTask& task, const GroupMeasure& measure, double value) {
-  if (measure.coordinate == GroupCoordinate::first)
-    return measure.factor * group_level(task.model, value);
-  const bool log_scale = task.model.function.scale != protocols::LevelScale::linear;
-  return measure.factor * (log_scale ? std::expm1(std::exp(value)) : std::exp(value));
 }
 
 std::string listed(const std::vector<std::string>& names) {
@@ -466,7 +463,29 @@ void add_detection(const Cells& cells, TaskGroupResults& out) {
   adjust(out, first);
 }
 
+bool of_same_stimulus(const auto& a, const auto& b) {
+  return a.task == b.task && a.block_name == b.block_name && a.shape == b.shape;
+}
+
+/// Participants with a figure of a renderer.
+std::set<std::string> names_with(const TaskGroup& group, const std::string& renderer) {
+  std::set<std::string> names;
+  for (const GroupMean& one : group.renderers) {
+    if (one.renderer != renderer) continue;
+    for (const NamedFigure& figure : one.participants) names.insert(figure.participant);
+  }
+  return names;
+}
+
 }  // namespace
+
+std::string TaskGroupModel::status() const {
+  return open_status(undefined, low.has_value(), high.has_value());
+}
+
+std::string TaskGroupComparison::status() const {
+  return open_status(undefined, low.has_value(), high.has_value());
+}
 
 TaskGroupResults group_models(const std::vector<TaskCell>& cells,
                               const std::vector<TaskComparison>& individual) {
@@ -490,33 +509,6 @@ TaskGroupResults group_models(const std::vector<TaskCell>& cells,
   }
   return out;
 }
-
-namespace {
-
-const TaskGroupModel* model_of(const std::vector<TaskGroupModel>& models, const TaskGroup& group,
-                               const std::string& renderer) {
-  const auto found = std::ranges::find_if(models, [&](const TaskGroupModel& one) {
-    return one.task == group.task && one.block_name == group.block_name &&
-           one.shape == group.shape && one.measure == group.measure && one.renderer == renderer;
-  });
-  return found == models.end() ? nullptr : &*found;
-}
-
-bool of_same_stimulus(const auto& a, const auto& b) {
-  return a.task == b.task && a.block_name == b.block_name && a.shape == b.shape;
-}
-
-/// Participants with a figure of a renderer.
-std::set<std::string> names_with(const TaskGroup& group, const std::string& renderer) {
-  std::set<std::string> names;
-  for (const GroupMean& one : group.renderers) {
-    if (one.renderer != renderer) continue;
-    for (const NamedFigure& figure : one.participants) names.insert(figure.participant);
-  }
-  return names;
-}
-
-}  // namespace
 
 void name_left_out(const std::vector<TaskCell>& cells, const std::vector<TaskGroup>& groups,
                    TaskGroupResults& results) {

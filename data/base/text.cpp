@@ -12,6 +12,51 @@ namespace {
 constexpr std::string_view kDigits =
     "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
+bool is_plain(const Character& c) {
+  const auto within = [&](std::uint32_t least, std::uint32_t most) {
+    return c.code >= least && c.code <= most;
+  };
+  if (!c.well_formed || c.code < 0x20 || within(0x7F, 0x9F)) return false;
+  // Marks, embeddings, overrides and isolates of direction (Unicode 15, 23.2).
+  if (c.code == 0x61C || within(0x200E, 0x200F) || within(0x202A, 0x202E) || within(0x2066, 0x2069))
+    return false;
+  if (within(0x2028, 0x2029)) return false;                      // separators of lines
+  if (c.code == 0xFEFF || within(0xFFF9, 0xFFFB)) return false;  // byte order mark, annotations
+  if (within(0xE0000, 0xE007F)) return false;                    // tags: invisible text
+  return (c.code & 0xFFFE) != 0xFFFE && !within(0xFDD0, 0xFDEF);
+}
+
+void append(const Character& c, std::string_view bytes, std::string& out) {
+  if (is_plain(c)) {
+    out += bytes;
+    return;
+  }
+  std::array<char, 16> text{};
+  const char* const form = !c.well_formed ? "\\x%02x" : c.code > 0xFFFF ? "\\U%08x" : "\\u%04x";
+  const unsigned value = c.well_formed ? c.code : static_cast<std::uint8_t>(bytes[0]);
+  std::snprintf(text.data(), text.size(), form, value);
+  out += text.data();
+}
+
+std::string shown(std::string_view text, std::size_t max_bytes, bool lines) {
+  std::string out;
+  while (!text.empty()) {
+    const Character c = first_character(text);
+    const std::size_t before = out.size();
+    if (lines && c.code == '\n' && c.well_formed) {
+      out += '\n';
+    } else {
+      append(c, text.substr(0, c.size), out);
+    }
+    if (out.size() > max_bytes) {
+      out.resize(before);
+      return out + "…";
+    }
+    text.remove_prefix(c.size);
+  }
+  return out;
+}
+
 }  // namespace
 
 std::string base64_encoded(std::string_view bytes) {
@@ -123,55 +168,6 @@ std::string utf8(std::uint32_t code) {
   if (code < 0x10000) return {static_cast<char>(0xE0U | code >> 12U), tail(6), tail(0)};
   return {static_cast<char>(0xF0U | (code >> 18U & 7U)), tail(12), tail(6), tail(0)};
 }
-
-namespace {
-
-bool is_plain(const Character& c) {
-  const auto within = [&](std::uint32_t least, std::uint32_t most) {
-    return c.code >= least && c.code <= most;
-  };
-  if (!c.well_formed || c.code < 0x20 || within(0x7F, 0x9F)) return false;
-  // Marks, embeddings, overrides and isolates of direction (Unicode 15, 23.2).
-  if (c.code == 0x61C || within(0x200E, 0x200F) || within(0x202A, 0x202E) || within(0x2066, 0x2069))
-    return false;
-  if (within(0x2028, 0x2029)) return false;                      // separators of lines
-  if (c.code == 0xFEFF || within(0xFFF9, 0xFFFB)) return false;  // byte order mark, annotations
-  if (within(0xE0000, 0xE007F)) return false;                    // tags: invisible text
-  return (c.code & 0xFFFE) != 0xFFFE && !within(0xFDD0, 0xFDEF);
-}
-
-void append(const Character& c, std::string_view bytes, std::string& out) {
-  if (is_plain(c)) {
-    out += bytes;
-    return;
-  }
-  std::array<char, 16> text{};
-  const char* const form = !c.well_formed ? "\\x%02x" : c.code > 0xFFFF ? "\\U%08x" : "\\u%04x";
-  const unsigned value = c.well_formed ? c.code : static_cast<std::uint8_t>(bytes[0]);
-  std::snprintf(text.data(), text.size(), form, value);
-  out += text.data();
-}
-
-std::string shown(std::string_view text, std::size_t max_bytes, bool lines) {
-  std::string out;
-  while (!text.empty()) {
-    const Character c = first_character(text);
-    const std::size_t before = out.size();
-    if (lines && c.code == '\n' && c.well_formed) {
-      out += '\n';
-    } else {
-      append(c, text.substr(0, c.size), out);
-    }
-    if (out.size() > max_bytes) {
-      out.resize(before);
-      return out + "…";
-    }
-    text.remove_prefix(c.size);
-  }
-  return out;
-}
-
-}  // namespace
 
 bool is_plain_utf8(std::string_view text) {
   while (!text.empty()) {

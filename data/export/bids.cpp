@@ -23,21 +23,13 @@
 #include "data/store/store.h"
 
 namespace palpate::data {
+namespace {
 
 // Internal to data/export: the files beside the samples of a BIDS run written as motion
 // (https://bids-specification.readthedocs.io, "Motion").
 
 /// Name of the tracking system in files: tracksys-stylus.
 inline constexpr const char* kTrackingSystem = "stylus";
-
-/// ..._channels.tsv: one row per column of the recording. Tip, tail and a moving stimulus are
-/// tracked points; BIDS has no type for forces, so they are MISC with their units.
-std::string motion_channels(const std::vector<Column>& columns);
-/// ..._channels.json: the reference frame of the channels.
-nlohmann::ordered_json motion_frames();
-/// Required fields of ..._motion.json other than the task. \param rows of the recording
-nlohmann::ordered_json motion_facts(const std::vector<Column>& columns, double rate,
-                                    std::int64_t rows, const RunInfo& run);
 
 /// The trials of a recording, and their intervals if they have several.
 class MotionEvents {
@@ -61,8 +53,6 @@ class MotionEvents {
   };
   std::vector<Event> events_;
 };
-
-namespace {
 
 struct Channel {
   std::string component = "n/a", type = "MISC", tracked_point = kTrackingSystem;
@@ -125,8 +115,8 @@ const std::vector<Column>& event_columns() {
   return all;
 }
 
-}  // namespace
-
+/// ..._channels.tsv: one row per column of the recording. Tip, tail and a moving stimulus are
+/// tracked points; BIDS has no type for forces, so they are MISC with their units.
 std::string motion_channels(const std::vector<Column>& columns) {
   DelimitedRow row(DelimitedFormat::tsv);
   row << "name"
@@ -152,6 +142,7 @@ std::string motion_channels(const std::vector<Column>& columns) {
   return table;
 }
 
+/// ..._channels.json: the reference frame of the channels.
 nlohmann::ordered_json motion_frames() {
   return {{"reference_frame",
            {{"Description",
@@ -160,6 +151,7 @@ nlohmann::ordered_json motion_frames() {
             {"Levels", {{"world", {{"SpatialAxes", "RAS"}, {"RotationRule", "right-hand"}}}}}}}};
 }
 
+/// Required fields of ..._motion.json other than the task. \param rows of the recording
 nlohmann::ordered_json motion_facts(const std::vector<Column>& columns, double rate,
                                     std::int64_t rows, const RunInfo& run) {
   std::map<std::string, int> types;
@@ -299,8 +291,6 @@ class BidsRecording {
   MotionEvents events_;
 };
 
-namespace {
-
 constexpr double kLongestGap = 60;  // s
 
 const Column kTrialOfSample{"trial", "Trial within the session, from 1, to which the tick belongs",
@@ -359,8 +349,6 @@ nlohmann::ordered_json objects_of(const StudyLabel& study) {
   }
   return objects;
 }
-
-}  // namespace
 
 BidsRecording::BidsRecording(const StoredTrial& first, const StudyLabel& study,
                              const ExportSettings& settings)
@@ -485,8 +473,6 @@ std::int64_t BidsRecording::first_row_ns() const {
   return begin_ns_ + static_cast<std::int64_t>(std::llround(static_cast<double>(first_row_) * 1e9 /
                                                             study_.facts.servo_rate));
 }
-
-namespace {
 
 using Json = nlohmann::ordered_json;
 

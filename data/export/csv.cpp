@@ -15,23 +15,6 @@
 #include "data/store/export_log.h"
 
 namespace palpate::data {
-
-std::int64_t write_attempts(Store& store, TextSink& out, const ExportClock& clock,
-                            ExportedParticipants& participants, ProgressCounter& counter) {
-  std::int64_t rows = 0;
-  DelimitedRow row(DelimitedFormat::csv);
-  row << attempt_columns(clock.times());
-  out.write(row.end());
-  store.for_each_cut_off([&](const StoredTrial& attempt) {
-    put_attempt(row, attempt, clock);
-    out.write(row.end());
-    participants.add(attempt.participant);
-    ++rows;
-    counter.next();
-  });
-  return rows;
-}
-
 namespace {
 
 namespace fs = std::filesystem;
@@ -112,7 +95,35 @@ std::int64_t write_trials(Store& store, TextSink& out, const ExportClock& clock,
   return rows;
 }
 
+void put_point(DelimitedRow& row, const SweepRow& point) {
+  row << point.point << (point.reason.empty() ? "ok" : "failed") << point.reason;
+  for (const SweepValue& value : point.values) {
+    if (const auto* const number = std::get_if<double>(&value)) {
+      row << *number;
+    } else {
+      row << std::string_view(std::get<std::string>(value));
+    }
+  }
+  for (const std::optional<double>& figure : point.figures) row << figure;
+}
+
 }  // namespace
+
+std::int64_t write_attempts(Store& store, TextSink& out, const ExportClock& clock,
+                            ExportedParticipants& participants, ProgressCounter& counter) {
+  std::int64_t rows = 0;
+  DelimitedRow row(DelimitedFormat::csv);
+  row << attempt_columns(clock.times());
+  out.write(row.end());
+  store.for_each_cut_off([&](const StoredTrial& attempt) {
+    put_attempt(row, attempt, clock);
+    out.write(row.end());
+    participants.add(attempt.participant);
+    ++rows;
+    counter.next();
+  });
+  return rows;
+}
 
 ExportResult export_csv(Store& store, const std::string& path, const ExportSettings& settings) {
   const CsvPaths paths = checked_paths(store, path, settings);
@@ -153,22 +164,6 @@ ExportResult export_csv(Store& store, const std::string& path, const ExportSetti
   commit_all(files, settings.force);
   return result;
 }
-
-namespace {
-
-void put_point(DelimitedRow& row, const SweepRow& point) {
-  row << point.point << (point.reason.empty() ? "ok" : "failed") << point.reason;
-  for (const SweepValue& value : point.values) {
-    if (const auto* const number = std::get_if<double>(&value)) {
-      row << *number;
-    } else {
-      row << std::string_view(std::get<std::string>(value));
-    }
-  }
-  for (const std::optional<double>& figure : point.figures) row << figure;
-}
-
-}  // namespace
 
 std::int64_t export_sweep_csv(SweepFile& sweep, const std::string& path, bool force,
                               const std::function<void(std::int64_t)>& progress) {

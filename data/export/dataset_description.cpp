@@ -29,31 +29,6 @@ void describe_table(const char* table, std::span<const Column> columns, const Pr
   }
 }
 
-}  // namespace
-
-void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSettings& settings,
-                    std::span<const Column> trials) {
-  DelimitedRow row(DelimitedFormat::csv);
-  row << "table"
-      << "column"
-      << "unit"
-      << "value"
-      << "meaning";
-  out.write(row.end());
-  describe_table("trials", trials, facts, settings, out);
-  describe_table("attempts", attempt_columns(settings.times), facts, settings, out);
-  if (!settings.pages) return;
-  describe_table("pages", page_columns(), facts, settings, out);
-  for (const auto& [place, question] : facts.questions) {
-    row << "pages"
-        << "item"
-        << "" << place << question;
-    out.write(row.end());
-  }
-}
-
-namespace {
-
 bool is_alphanumeric(char c) {
   return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z');
 }
@@ -92,7 +67,50 @@ std::map<std::string, std::string> file_names(const std::vector<ProtocolFile>& f
   return names;
 }
 
+void add_stimuli(nlohmann::ordered_json& levels, const ProtocolFacts& facts) {
+  for (const StimulusFacts& stimulus : facts.stimuli)
+    levels[guarded_text(stimulus.name)] = "stimulus of the protocol";
+}
+
+/// Adds no codes if some answers are numbers.
+void add_answers(nlohmann::ordered_json& levels, const ProtocolFacts& facts) {
+  std::set<std::string> tasks;
+  for (const BlockFacts& block : facts.blocks) tasks.insert(block.task);
+  if (tasks.contains("rate") || tasks.contains("adjust")) return;
+  if (tasks.contains("compare")) {
+    for (const char* interval : {"1", "2", "3"}) levels[interval] = "that interval";
+    levels["same"] = "the intervals were the same";
+    levels["different"] = "they were not";
+  }
+  if (tasks.contains("detect")) {
+    levels["yes"] = "there was something";
+    levels["no"] = "there was nothing";
+  }
+  if (tasks.empty() || tasks.contains("identify")) add_stimuli(levels, facts);
+}
+
 }  // namespace
+
+void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSettings& settings,
+                    std::span<const Column> trials) {
+  DelimitedRow row(DelimitedFormat::csv);
+  row << "table"
+      << "column"
+      << "unit"
+      << "value"
+      << "meaning";
+  out.write(row.end());
+  describe_table("trials", trials, facts, settings, out);
+  describe_table("attempts", attempt_columns(settings.times), facts, settings, out);
+  if (!settings.pages) return;
+  describe_table("pages", page_columns(), facts, settings, out);
+  for (const auto& [place, question] : facts.questions) {
+    row << "pages"
+        << "item"
+        << "" << place << question;
+    out.write(row.end());
+  }
+}
 
 void write_protocol_files(Store& store, const StudyLabel& study, const std::string& folder,
                           const AtomicFolder& draft) {
@@ -160,32 +178,6 @@ std::string dataset_description(const std::map<std::string, StudyLabel>& labels,
   }
   return text + (simulated ? std::string(" ") + kSimulatedSentence : "");
 }
-
-namespace {
-
-void add_stimuli(nlohmann::ordered_json& levels, const ProtocolFacts& facts) {
-  for (const StimulusFacts& stimulus : facts.stimuli)
-    levels[guarded_text(stimulus.name)] = "stimulus of the protocol";
-}
-
-/// Adds no codes if some answers are numbers.
-void add_answers(nlohmann::ordered_json& levels, const ProtocolFacts& facts) {
-  std::set<std::string> tasks;
-  for (const BlockFacts& block : facts.blocks) tasks.insert(block.task);
-  if (tasks.contains("rate") || tasks.contains("adjust")) return;
-  if (tasks.contains("compare")) {
-    for (const char* interval : {"1", "2", "3"}) levels[interval] = "that interval";
-    levels["same"] = "the intervals were the same";
-    levels["different"] = "they were not";
-  }
-  if (tasks.contains("detect")) {
-    levels["yes"] = "there was something";
-    levels["no"] = "there was nothing";
-  }
-  if (tasks.empty() || tasks.contains("identify")) add_stimuli(levels, facts);
-}
-
-}  // namespace
 
 nlohmann::ordered_json column_levels(const Column& column, const ProtocolFacts& facts) {
   nlohmann::ordered_json levels;

@@ -112,6 +112,12 @@ std::vector<Column> make_trials() {
   return columns;
 }
 
+std::vector<std::string> names() {
+  std::vector<std::string> out;
+  for (const Column& column : trial_columns(ExportClock())) out.emplace_back(column.name);
+  return out;
+}
+
 /// Adds the columns of trials of protocol version 2.
 std::vector<Column> with_tasks(std::vector<Column> columns) {
   for (Column& column : columns) {
@@ -291,6 +297,24 @@ std::vector<Column> made_relative(std::vector<Column> columns) {
   return columns;
 }
 
+void add_to_list(std::string& list, std::optional<double> value, bool first) {
+  if (!first) list += ';';
+  char text[32];
+  if (value) list.append(text, std::to_chars(text, text + sizeof text, *value).ptr);
+}
+
+bool quotes_needed(std::string_view text) {
+  // Without early exit, so that compilers vectorise the loop.
+  bool needed = false;
+  for (const char c : text) needed |= c == ',' || c == '"' || c == '\r' || c == '\n';
+  return needed;
+}
+
+bool fits_tsv(std::string_view text) {
+  return text != "n/a" && std::none_of(text.begin(), text.end(),
+                                       [](char c) { return c == '\t' || c == '\r' || c == '\n'; });
+}
+
 }  // namespace
 
 std::span<const Column> trial_columns(const ExportClock& clock) {
@@ -329,16 +353,6 @@ std::span<const Column> body_columns() {
   static const std::vector<Column> all = make_bodies();
   return all;
 }
-
-namespace {
-
-void add_to_list(std::string& list, std::optional<double> value, bool first) {
-  if (!first) list += ';';
-  char text[32];
-  if (value) list.append(text, std::to_chars(text, text + sizeof text, *value).ptr);
-}
-
-}  // namespace
 
 TaskValues::TaskValues(const TrialRecord& record) {
   const TaskRecord& from = record.task;
@@ -420,22 +434,6 @@ void put_body(DelimitedRow& row, const TrialRecord& record, const SampleRecord& 
     for (const double x : vector) row.rounded(x, kDecimals);
   }
 }
-
-namespace {
-
-bool quotes_needed(std::string_view text) {
-  // Without early exit, so that compilers vectorise the loop.
-  bool needed = false;
-  for (const char c : text) needed |= c == ',' || c == '"' || c == '\r' || c == '\n';
-  return needed;
-}
-
-bool fits_tsv(std::string_view text) {
-  return text != "n/a" && std::none_of(text.begin(), text.end(),
-                                       [](char c) { return c == '\t' || c == '\r' || c == '\n'; });
-}
-
-}  // namespace
 
 DelimitedRow& DelimitedRow::raw(std::string_view text) {
   if (ended_) {
@@ -533,16 +531,6 @@ std::int64_t write_pages(Store& store, TextSink& out, const ExportClock& clock,
   }
   return rows;
 }
-
-namespace {
-
-std::vector<std::string> names() {
-  std::vector<std::string> out;
-  for (const Column& column : trial_columns(ExportClock())) out.emplace_back(column.name);
-  return out;
-}
-
-}  // namespace
 
 TrialTable::TrialTable() : table_(names()) {}
 

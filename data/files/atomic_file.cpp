@@ -43,6 +43,15 @@ void remove_unlocked(const fs::path& folder, IsTemporary is_temporary) {
   }
 }
 
+/// Whether `name` in `folder` is the open file.
+bool leads_to(int folder, const std::string& name, int descriptor) {
+  struct stat named {
+  }, opened{};
+  return ::fstat(descriptor, &opened) == 0 &&
+         ::fstatat(folder, name.c_str(), &named, AT_SYMLINK_NOFOLLOW) == 0 &&
+         named.st_dev == opened.st_dev && named.st_ino == opened.st_ino;
+}
+
 }  // namespace
 
 std::string random_letters() {
@@ -79,21 +88,6 @@ void remove_stale_temporaries_in(const std::string& folder) {
            name.size() == letters + kMark.size() + kLetters;
   });
 }
-
-namespace {
-
-namespace fs = std::filesystem;
-
-/// Whether `name` in `folder` is the open file.
-bool leads_to(int folder, const std::string& name, int descriptor) {
-  struct stat named {
-  }, opened{};
-  return ::fstat(descriptor, &opened) == 0 &&
-         ::fstatat(folder, name.c_str(), &named, AT_SYMLINK_NOFOLLOW) == 0 &&
-         named.st_dev == opened.st_dev && named.st_ino == opened.st_ino;
-}
-
-}  // namespace
 
 AtomicFile::AtomicFile(const std::string& target) : target_(target) {
   require_name(target);

@@ -14,6 +14,35 @@
 #include "data/files/output_check.h"
 
 namespace palpate::data {
+namespace {
+
+namespace fs = std::filesystem;
+
+bool is_trusted_owner(uid_t owner) { return owner == ::geteuid() || owner == 0; }
+
+std::string octal(mode_t mode) {
+  std::array<char, 8> text{};
+  std::snprintf(text.data(), text.size(), "%04o", static_cast<unsigned>(mode & 07777));
+  return text.data();
+}
+
+/// A user private group, as Debian creates for every user: it has no other members.
+bool is_private_group(uid_t user, gid_t group) {
+  const passwd* const person = ::getpwuid(user);
+  if (person == nullptr || person->pw_gid != group) return false;
+  const std::string name = person->pw_name;
+  const ::group* const members = ::getgrgid(group);
+  return members != nullptr && name == members->gr_name && members->gr_mem[0] == nullptr;
+}
+
+bool others_may_write(const struct stat& found) {
+  if ((found.st_mode & S_IWOTH) != 0) return true;
+  return (found.st_mode & S_IWGRP) != 0 && !is_private_group(found.st_uid, found.st_gid);
+}
+
+bool is_foreign(uid_t owner) { return owner != ::geteuid() && owner != 0; }
+
+}  // namespace
 
 FileIdentity identity_of(const std::string& path) {
   struct stat found {};
@@ -25,14 +54,6 @@ std::uint64_t names_of_file(const std::string& path) {
   struct stat found {};
   return ::stat(path.c_str(), &found) == 0 ? found.st_nlink : 0;
 }
-
-namespace {
-
-namespace fs = std::filesystem;
-
-bool is_trusted_owner(uid_t owner) { return owner == ::geteuid() || owner == 0; }
-
-}  // namespace
 
 ResolvedPath resolve_trusted_links(const std::string& path) {
   constexpr int kMostLinks = 40;
@@ -68,32 +89,6 @@ ResolvedPath resolve_trusted_links(const std::string& path) {
     if (to.is_absolute()) done = "/";
   }
 }
-
-namespace {
-
-std::string octal(mode_t mode) {
-  std::array<char, 8> text{};
-  std::snprintf(text.data(), text.size(), "%04o", static_cast<unsigned>(mode & 07777));
-  return text.data();
-}
-
-/// A user private group, as Debian creates for every user: it has no other members.
-bool is_private_group(uid_t user, gid_t group) {
-  const passwd* const person = ::getpwuid(user);
-  if (person == nullptr || person->pw_gid != group) return false;
-  const std::string name = person->pw_name;
-  const ::group* const members = ::getgrgid(group);
-  return members != nullptr && name == members->gr_name && members->gr_mem[0] == nullptr;
-}
-
-bool others_may_write(const struct stat& found) {
-  if ((found.st_mode & S_IWOTH) != 0) return true;
-  return (found.st_mode & S_IWGRP) != 0 && !is_private_group(found.st_uid, found.st_gid);
-}
-
-bool is_foreign(uid_t owner) { return owner != ::geteuid() && owner != 0; }
-
-}  // namespace
 
 void require_private_sqlite_files(const std::string& file) {
   struct stat database {};

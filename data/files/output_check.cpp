@@ -61,6 +61,8 @@ std::string stream_refusal(const struct stat& found, std::optional<int> descript
   return "is a device; name a file";
 }
 
+constexpr const char* kNoName = "names no file or folder here; for a file of this name write ./-";
+
 }  // namespace
 
 const std::vector<std::string>& sqlite_file_suffixes() {
@@ -120,12 +122,6 @@ std::string write_fault(int error) {
            "it)";
   return std::generic_category().message(error);
 }
-
-namespace {
-
-constexpr const char* kNoName = "names no file or folder here; for a file of this name write ./-";
-
-}  // namespace
 
 void require_name(const std::string& path) {
   if (path == "-") throw StoreRefused(path + ": " + kNoName);

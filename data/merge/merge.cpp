@@ -60,37 +60,6 @@ void require_same_plan(const SweepPlan& plan, const std::string& first, const Sw
   throw StoreRefused(text);
 }
 
-}  // namespace
-
-SweepMergeResult merge_sweeps(const std::string& out, const std::vector<std::string>& inputs,
-                              const std::function<void(std::int64_t)>& progress) {
-  require_new(out);
-  if (inputs.empty()) throw StoreRefused("no file to merge");
-  const AtomicFolder folder(out);
-  SweepMergeResult done;
-  std::optional<SweepCopy> copy;
-  std::vector<FileIdentity> seen;
-  std::int64_t files = 0;
-  for (const std::string& input : inputs) {
-    const FileIdentity identity = identity_of(input);
-    if (std::find(seen.begin(), seen.end(), identity) != seen.end()) continue;
-    if (identity != FileIdentity{}) seen.push_back(identity);
-    SweepFile file = SweepFile::open(input, SweepFile::Writers::none);
-    if (!copy) {
-      done.plan = file.plan();
-      copy.emplace(folder / "merged.sweep", done.plan);
-    }
-    require_same_plan(done.plan, inputs.front(), file);
-    copy->add(file);
-    if (progress) progress(++files);
-  }
-  std::tie(done.points, done.failed) = copy->finish();
-  if (!rename_if_absent(folder / "merged.sweep", out)) {
-    throw StoreRefused(out + ": another program has created it meanwhile; nothing was written");
-  }
-  return done;
-}
-
 // Internal to data/merge: compares and copies sessions between databases. Row ids differ between
 // databases: rows are compared and copied without keys, in an order of their own.
 
@@ -106,20 +75,6 @@ struct SessionRows {
 /// attempts and answers to pages: position of their run, 0. Samples: trial and number of their
 /// attempt.
 inline constexpr int kParentColumns = 2;
-
-/// runs, notes, attempts, samples, page_answers: in the order of insertion that foreign keys need.
-std::array<SessionRows, 5> session_rows(SQLite::Database& db);
-
-/// Whether two sessions are identical to the bit.
-bool same_session(SQLite::Database& db_a, std::int64_t id_a, SQLite::Database& db_b,
-                  std::int64_t id_b);
-
-/// Inserts a copy of a session. \param participant its participant's id in `to`.
-/// \throws SQLite::Exception: rows of the session refer to another session.
-void copy_session(SQLite::Database& from, std::int64_t id, SQLite::Database& to,
-                  std::int64_t participant);
-
-namespace {
 
 struct FoundParticipant {
   std::int64_t id = 0;
@@ -350,6 +305,88 @@ void Planner::assign_numbers(PlannedProtocol& protocol, NumberConflict clash) {
   }
 }
 
+/// "number, observer_sha256": the columns of a table without keys.
+std::string columns_but_keys(SQLite::Database& db, const std::string& table) {
+  std::string columns;
+  SQLite::Statement find(db, "SELECT name FROM pragma_table_info(?)");
+  find.bind(1, table);
+  while (find.executeStep()) {
+    const std::string name = find.getColumn(0).getString();
+    if (name == "id" || name.ends_with("_id")) continue;
+    columns += (columns.empty() ? "" : ", ") + name;
+  }
+  return columns;
+}
+
+bool same_value(const SQLite::Column& a, const SQLite::Column& b) {
+  if (a.getType() != b.getType()) return false;
+  if (a.isInteger()) return a.getInt64() == b.getInt64();
+  if (a.isFloat()) return a.getDouble() == b.getDouble();
+  const void *bytes_a = a.getBlob(), *bytes_b = b.getBlob();  // must precede getBytes()
+  const int size = a.getBytes();
+  return size == b.getBytes() &&
+         (size == 0 || std::memcmp(bytes_a, bytes_b, static_cast<std::size_t>(size)) == 0);
+}
+
+bool same_rows(SQLite::Statement& a, SQLite::Statement& b) {
+  if (a.getColumnCount() != b.getColumnCount()) return false;
+  while (true) {
+    const bool more = a.executeStep();
+    if (more != b.executeStep()) return false;
+    if (!more) return true;
+    for (int i = 0; i < a.getColumnCount(); ++i) {
+      if (!same_value(a.getColumn(i), b.getColumn(i))) return false;
+    }
+  }
+}
+
+/// runs, notes, attempts, samples, page_answers: in the order of insertion that foreign keys need.
+std::array<SessionRows, 5> session_rows(SQLite::Database& db) {
+  const std::string which_run =
+      "(SELECT count(*) FROM runs q WHERE q.session_id = ?1 AND q.id <= t.run_id), 0, ";
+  std::array<SessionRows, 5> all{{{"runs", "", ""},
+                                  {"notes", "", ""},
+                                  {"attempts", "", ""},
+                                  {"samples", "", ""},
+                                  {"page_answers", "", ""}}};
+  for (SessionRows& one : all) one.columns = columns_but_keys(db, one.table);
+  all[0].select =
+      "SELECT row_number() OVER (ORDER BY t.id), (SELECT sha256 FROM protocols WHERE id = "
+      "t.protocol_id), " +
+      all[0].columns + " FROM runs t WHERE t.session_id = ?1 ORDER BY t.id";
+  all[1].select = "SELECT " + which_run + all[1].columns +
+                  " FROM notes t WHERE t.run_id IN (SELECT id FROM runs WHERE session_id = ?1) "
+                  "ORDER BY t.run_id, t.id";
+  all[2].select = "SELECT " + which_run + all[2].columns +
+                  " FROM attempts t WHERE t.session_id = ?1 ORDER BY t.trial, t.attempt";
+  all[3].select = "SELECT a.trial, a.attempt, " + all[3].columns +
+                  " FROM attempts a JOIN samples t ON t.attempt_id = a.id WHERE a.session_id = ?1 "
+                  "ORDER BY a.trial, a.attempt";
+  all[4].select = "SELECT " + which_run + all[4].columns +
+                  " FROM page_answers t WHERE t.run_id IN (SELECT id FROM runs WHERE session_id = "
+                  "?1) ORDER BY t.run_id, t.id";
+  return all;
+}
+
+/// Whether two sessions are identical to the bit.
+bool same_session(SQLite::Database& db_a, std::int64_t id_a, SQLite::Database& db_b,
+                  std::int64_t id_b) {
+  const auto same = [&](const std::string& sql_a, const std::string& sql_b) {
+    SQLite::Statement a(db_a, sql_a), b(db_b, sql_b);
+    a.bind(1, id_a);
+    b.bind(1, id_b);
+    return same_rows(a, b);
+  };
+  const std::string session =
+      "SELECT " + columns_but_keys(db_a, "sessions") + " FROM sessions WHERE id = ?1";
+  if (!same(session, session)) return false;
+  const auto rows_a = session_rows(db_a), rows_b = session_rows(db_b);
+  for (std::size_t i = 0; i < rows_a.size(); ++i) {
+    if (!same(rows_a[i].select, rows_b[i].select)) return false;
+  }
+  return true;
+}
+
 void Planner::add_sessions(PlannedParticipant& known, const PlannedParticipant& found) {
   const auto conflict = [&](const PlannedSession& other, const std::string& what) {
     conflicts_.push_back("participant " + known.code + ": " + what + " (" + other.station->path() +
@@ -401,37 +438,6 @@ void Planner::require_same_protocols(const std::deque<StationDatabase>& stations
   }
 }
 
-}  // namespace
-
-MergePlan plan_merge(std::deque<StationDatabase>& stations, NumberConflict clash) {
-  return Planner().plan(stations, clash);
-}
-
-namespace {
-
-/// "number, observer_sha256": the columns of a table without keys.
-std::string columns_but_keys(SQLite::Database& db, const std::string& table) {
-  std::string columns;
-  SQLite::Statement find(db, "SELECT name FROM pragma_table_info(?)");
-  find.bind(1, table);
-  while (find.executeStep()) {
-    const std::string name = find.getColumn(0).getString();
-    if (name == "id" || name.ends_with("_id")) continue;
-    columns += (columns.empty() ? "" : ", ") + name;
-  }
-  return columns;
-}
-
-bool same_value(const SQLite::Column& a, const SQLite::Column& b) {
-  if (a.getType() != b.getType()) return false;
-  if (a.isInteger()) return a.getInt64() == b.getInt64();
-  if (a.isFloat()) return a.getDouble() == b.getDouble();
-  const void *bytes_a = a.getBlob(), *bytes_b = b.getBlob();  // must precede getBytes()
-  const int size = a.getBytes();
-  return size == b.getBytes() &&
-         (size == 0 || std::memcmp(bytes_a, bytes_b, static_cast<std::size_t>(size)) == 0);
-}
-
 void bind_value(SQLite::Statement& to, int index, const SQLite::Column& value) {
   if (value.isInteger()) {
     to.bind(index, value.getInt64());
@@ -444,18 +450,6 @@ void bind_value(SQLite::Statement& to, int index, const SQLite::Column& value) {
     to.bindNoCopy(index, bytes, value.getBytes());
   } else {
     to.bind(index);
-  }
-}
-
-bool same_rows(SQLite::Statement& a, SQLite::Statement& b) {
-  if (a.getColumnCount() != b.getColumnCount()) return false;
-  while (true) {
-    const bool more = a.executeStep();
-    if (more != b.executeStep()) return false;
-    if (!more) return true;
-    for (int i = 0; i < a.getColumnCount(); ++i) {
-      if (!same_value(a.getColumn(i), b.getColumn(i))) return false;
-    }
   }
 }
 
@@ -577,61 +571,12 @@ class SessionCopier {
   std::map<std::pair<std::int64_t, std::int64_t>, std::int64_t> attempts_;  // (trial, number) -> id
 };
 
-}  // namespace
-
-std::array<SessionRows, 5> session_rows(SQLite::Database& db) {
-  const std::string which_run =
-      "(SELECT count(*) FROM runs q WHERE q.session_id = ?1 AND q.id <= t.run_id), 0, ";
-  std::array<SessionRows, 5> all{{{"runs", "", ""},
-                                  {"notes", "", ""},
-                                  {"attempts", "", ""},
-                                  {"samples", "", ""},
-                                  {"page_answers", "", ""}}};
-  for (SessionRows& one : all) one.columns = columns_but_keys(db, one.table);
-  all[0].select =
-      "SELECT row_number() OVER (ORDER BY t.id), (SELECT sha256 FROM protocols WHERE id = "
-      "t.protocol_id), " +
-      all[0].columns + " FROM runs t WHERE t.session_id = ?1 ORDER BY t.id";
-  all[1].select = "SELECT " + which_run + all[1].columns +
-                  " FROM notes t WHERE t.run_id IN (SELECT id FROM runs WHERE session_id = ?1) "
-                  "ORDER BY t.run_id, t.id";
-  all[2].select = "SELECT " + which_run + all[2].columns +
-                  " FROM attempts t WHERE t.session_id = ?1 ORDER BY t.trial, t.attempt";
-  all[3].select = "SELECT a.trial, a.attempt, " + all[3].columns +
-                  " FROM attempts a JOIN samples t ON t.attempt_id = a.id WHERE a.session_id = ?1 "
-                  "ORDER BY a.trial, a.attempt";
-  all[4].select = "SELECT " + which_run + all[4].columns +
-                  " FROM page_answers t WHERE t.run_id IN (SELECT id FROM runs WHERE session_id = "
-                  "?1) ORDER BY t.run_id, t.id";
-  return all;
-}
-
-bool same_session(SQLite::Database& db_a, std::int64_t id_a, SQLite::Database& db_b,
-                  std::int64_t id_b) {
-  const auto same = [&](const std::string& sql_a, const std::string& sql_b) {
-    SQLite::Statement a(db_a, sql_a), b(db_b, sql_b);
-    a.bind(1, id_a);
-    b.bind(1, id_b);
-    return same_rows(a, b);
-  };
-  const std::string session =
-      "SELECT " + columns_but_keys(db_a, "sessions") + " FROM sessions WHERE id = ?1";
-  if (!same(session, session)) return false;
-  const auto rows_a = session_rows(db_a), rows_b = session_rows(db_b);
-  for (std::size_t i = 0; i < rows_a.size(); ++i) {
-    if (!same(rows_a[i].select, rows_b[i].select)) return false;
-  }
-  return true;
-}
-
+/// Inserts a copy of a session. \param participant its participant's id in `to`.
+/// \throws SQLite::Exception: rows of the session refer to another session.
 void copy_session(SQLite::Database& from, std::int64_t id, SQLite::Database& to,
                   std::int64_t participant) {
   SessionCopier(from, id, to).copy(participant);
 }
-
-namespace {
-
-namespace fs = std::filesystem;
 
 void require_free(const std::string& out) {
   std::error_code error;
@@ -725,6 +670,39 @@ void sync_file(const std::string& file) {
 }
 
 }  // namespace
+
+SweepMergeResult merge_sweeps(const std::string& out, const std::vector<std::string>& inputs,
+                              const std::function<void(std::int64_t)>& progress) {
+  require_new(out);
+  if (inputs.empty()) throw StoreRefused("no file to merge");
+  const AtomicFolder folder(out);
+  SweepMergeResult done;
+  std::optional<SweepCopy> copy;
+  std::vector<FileIdentity> seen;
+  std::int64_t files = 0;
+  for (const std::string& input : inputs) {
+    const FileIdentity identity = identity_of(input);
+    if (std::find(seen.begin(), seen.end(), identity) != seen.end()) continue;
+    if (identity != FileIdentity{}) seen.push_back(identity);
+    SweepFile file = SweepFile::open(input, SweepFile::Writers::none);
+    if (!copy) {
+      done.plan = file.plan();
+      copy.emplace(folder / "merged.sweep", done.plan);
+    }
+    require_same_plan(done.plan, inputs.front(), file);
+    copy->add(file);
+    if (progress) progress(++files);
+  }
+  std::tie(done.points, done.failed) = copy->finish();
+  if (!rename_if_absent(folder / "merged.sweep", out)) {
+    throw StoreRefused(out + ": another program has created it meanwhile; nothing was written");
+  }
+  return done;
+}
+
+MergePlan plan_merge(std::deque<StationDatabase>& stations, NumberConflict clash) {
+  return Planner().plan(stations, clash);
+}
 
 MergeResult merge(const std::string& out, const std::vector<std::string>& inputs,
                   const std::function<void(std::int64_t, std::int64_t)>& progress,

@@ -270,85 +270,6 @@ std::string uncompressed(const std::vector<unsigned char>& planes) {
   return packed;
 }
 
-}  // namespace
-
-PackedSamples pack_samples(const std::vector<SampleRecord>& samples,
-                           const std::vector<BodyRecord>& bodies) {
-  const std::size_t count = samples.size();
-  if (!bodies.empty() && bodies.size() != count)
-    throw std::invalid_argument("expected one body for each sample, or none");
-  const int packing = bodies.empty() ? kPlainSamplesPacking : kSamplesPacking;
-  std::vector<unsigned char> planes(count * bytes_a_sample(packing));
-  std::size_t offset = 0;
-  visit_columns(packing, samples, bodies, [&](const auto& of, auto get, auto form) {
-    using Field = decltype(form);
-    using Pattern = Bits<Field>;
-    Pattern before = 0;
-    for (std::size_t i = 0; i < count; ++i) {
-      const auto pattern = std::bit_cast<Pattern>(static_cast<Field>(get(of[i])));
-      const auto stored = sizeof(Field) == 1 ? pattern : static_cast<Pattern>(pattern - before);
-      before = pattern;
-      for (std::size_t byte = 0; byte < sizeof(Field); ++byte) {
-        planes[offset + byte * count + i] =
-            static_cast<unsigned char>(stored >> (8 * (sizeof(Field) - 1 - byte)));
-      }
-    }
-    offset += sizeof(Field) * count;
-  });
-  PackedSamples packed{packing, compressed(planes)};
-  // Store nearly equal samples uncompressed: their compressed size would look like a damaged count.
-  if (!bytes_suffice(count, packed.bytes.size()))
-    packed = {bodies.empty() ? kZlibPlain : kZlibWithBodies, uncompressed(planes)};
-  const std::uint32_t crc = crc_of(planes.data(), planes.size());
-  for (int shift = 24; shift >= 0; shift -= 8) packed.bytes += static_cast<char>(crc >> shift);
-  return packed;
-}
-
-RecordedSamples unpack_samples(const void* data, std::size_t size, std::int64_t count,
-                               int packing) {
-  if (count < 0 || count > kMostSamples) throw StoreError("the number of samples is damaged");
-  const auto rows = static_cast<std::size_t>(count);
-  const std::size_t expected = rows * bytes_a_sample(packing);
-  if ((!is_zstd(packing) && expected / kMostShrunk > size) || (packing > 2 && size < kCrcSize))
-    refuse();
-  if (!bytes_suffice(rows, size)) refuse();
-  if (packing > 2) size -= kCrcSize;
-  Planes planes(decoder_of(packing, data, size));
-  RecordedSamples out;
-  out.samples.resize(rows);
-  if (has_bodies(packing)) out.bodies.resize(rows);
-  std::vector<std::uint64_t> column(rows);
-  visit_columns(packing, out.samples, out.bodies, [&](auto& of, auto get, auto form) {
-    using Field = decltype(form);
-    using Pattern = Bits<Field>;
-    for (std::size_t byte = 0; byte < sizeof(Field); ++byte) {
-      for (std::size_t i = 0; i < rows;) {
-        for (const unsigned char stored : planes.take(rows - i)) {
-          column[i] = (byte == 0 ? 0 : column[i] << 8) | stored;
-          ++i;
-        }
-      }
-    }
-    Pattern before = 0;
-    for (std::size_t i = 0; i < rows; ++i) {
-      const auto pattern =
-          static_cast<Pattern>(sizeof(Field) == 1 ? column[i] : column[i] + before);
-      before = pattern;
-      get(of[i]) = std::bit_cast<Field>(pattern);
-    }
-  });
-  planes.expect_end();
-  if (packing > 2) {
-    std::uint32_t crc = 0;
-    for (std::size_t i = 0; i < kCrcSize; ++i)
-      crc = crc << 8 | static_cast<const unsigned char*>(data)[size + i];
-    if (crc != planes.crc()) refuse();
-  }
-  return out;
-}
-
-namespace {
-
 constexpr int kSealsSince = 3;  // schema version
 
 AttemptState state_of(const std::string& text) {
@@ -642,20 +563,6 @@ void AttemptReader::read() {
   if (filter_.trial == nullptr && !filter_.session) require_no_hidden_rows();
 }
 
-}  // namespace
-
-void read_attempts(SQLite::Database& db, const std::string& path, int version,
-                   const AttemptFilter& filter,
-                   const std::function<void(const StoredTrial&)>& visit) {
-  AttemptReader(db, path, version, filter, visit).read();
-}
-
-// Writes attempts: one by one as they are shown, or many simulated ones in one transaction.
-// begin_attempt commits before the stimulus is shown, so that a crash leaves a trace of the
-// attempt; finish_attempt commits its record.
-
-namespace {
-
 std::string trial_name(const TrialRecord& record) {
   return "session " + std::to_string(record.session) + ", trial " + std::to_string(record.trial);
 }
@@ -749,6 +656,91 @@ bool has_record(SQLite::Database& db, const Run& run, int trial) {
 }
 
 }  // namespace
+
+PackedSamples pack_samples(const std::vector<SampleRecord>& samples,
+                           const std::vector<BodyRecord>& bodies) {
+  const std::size_t count = samples.size();
+  if (!bodies.empty() && bodies.size() != count)
+    throw std::invalid_argument("expected one body for each sample, or none");
+  const int packing = bodies.empty() ? kPlainSamplesPacking : kSamplesPacking;
+  std::vector<unsigned char> planes(count * bytes_a_sample(packing));
+  std::size_t offset = 0;
+  visit_columns(packing, samples, bodies, [&](const auto& of, auto get, auto form) {
+    using Field = decltype(form);
+    using Pattern = Bits<Field>;
+    Pattern before = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      const auto pattern = std::bit_cast<Pattern>(static_cast<Field>(get(of[i])));
+      const auto stored = sizeof(Field) == 1 ? pattern : static_cast<Pattern>(pattern - before);
+      before = pattern;
+      for (std::size_t byte = 0; byte < sizeof(Field); ++byte) {
+        planes[offset + byte * count + i] =
+            static_cast<unsigned char>(stored >> (8 * (sizeof(Field) - 1 - byte)));
+      }
+    }
+    offset += sizeof(Field) * count;
+  });
+  PackedSamples packed{packing, compressed(planes)};
+  // Store nearly equal samples uncompressed: their compressed size would look like a damaged count.
+  if (!bytes_suffice(count, packed.bytes.size()))
+    packed = {bodies.empty() ? kZlibPlain : kZlibWithBodies, uncompressed(planes)};
+  const std::uint32_t crc = crc_of(planes.data(), planes.size());
+  for (int shift = 24; shift >= 0; shift -= 8) packed.bytes += static_cast<char>(crc >> shift);
+  return packed;
+}
+
+RecordedSamples unpack_samples(const void* data, std::size_t size, std::int64_t count,
+                               int packing) {
+  if (count < 0 || count > kMostSamples) throw StoreError("the number of samples is damaged");
+  const auto rows = static_cast<std::size_t>(count);
+  const std::size_t expected = rows * bytes_a_sample(packing);
+  if ((!is_zstd(packing) && expected / kMostShrunk > size) || (packing > 2 && size < kCrcSize))
+    refuse();
+  if (!bytes_suffice(rows, size)) refuse();
+  if (packing > 2) size -= kCrcSize;
+  Planes planes(decoder_of(packing, data, size));
+  RecordedSamples out;
+  out.samples.resize(rows);
+  if (has_bodies(packing)) out.bodies.resize(rows);
+  std::vector<std::uint64_t> column(rows);
+  visit_columns(packing, out.samples, out.bodies, [&](auto& of, auto get, auto form) {
+    using Field = decltype(form);
+    using Pattern = Bits<Field>;
+    for (std::size_t byte = 0; byte < sizeof(Field); ++byte) {
+      for (std::size_t i = 0; i < rows;) {
+        for (const unsigned char stored : planes.take(rows - i)) {
+          column[i] = (byte == 0 ? 0 : column[i] << 8) | stored;
+          ++i;
+        }
+      }
+    }
+    Pattern before = 0;
+    for (std::size_t i = 0; i < rows; ++i) {
+      const auto pattern =
+          static_cast<Pattern>(sizeof(Field) == 1 ? column[i] : column[i] + before);
+      before = pattern;
+      get(of[i]) = std::bit_cast<Field>(pattern);
+    }
+  });
+  planes.expect_end();
+  if (packing > 2) {
+    std::uint32_t crc = 0;
+    for (std::size_t i = 0; i < kCrcSize; ++i)
+      crc = crc << 8 | static_cast<const unsigned char*>(data)[size + i];
+    if (crc != planes.crc()) refuse();
+  }
+  return out;
+}
+
+void read_attempts(SQLite::Database& db, const std::string& path, int version,
+                   const AttemptFilter& filter,
+                   const std::function<void(const StoredTrial&)>& visit) {
+  AttemptReader(db, path, version, filter, visit).read();
+}
+
+// Writes attempts: one by one as they are shown, or many simulated ones in one transaction.
+// begin_attempt commits before the stimulus is shown, so that a crash leaves a trace of the
+// attempt; finish_attempt commits its record.
 
 void cut_off_open_attempt(SQLite::Database& db, SealWriter& seals, const Run& run,
                           const std::string& reason) {

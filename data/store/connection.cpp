@@ -57,69 +57,6 @@ int cause_of(const std::string& path, const SQLite::Exception& error) {
   return limited || (may_be_full && disk_is_full(path)) ? SQLITE_FULL : code;
 }
 
-}  // namespace
-
-void raise_store_error(const std::string& path, const SQLite::Exception& error) {
-  const std::string detail = std::string(" (SQLite: ") + error.what() + ")";
-  switch (cause_of(path, error)) {
-    case SQLITE_NOTADB:
-      throw StoreRefused(path + ": is not a palpate database" + detail +
-                         "; name another file, or restore it from a backup");
-    case SQLITE_CORRUPT:
-      throw StoreRefused(
-          path + ": is damaged or truncated" + detail + "; keep a copy of it and of " + path +
-          "-wal, then restore a backup or recover with: sqlite3 '" + path + "' .recover");
-    case SQLITE_FULL:
-      throw StoreError(path + ": " + full_disk(path) + ", this step was not saved" + detail +
-                       "; free some space or raise the limit, then give the same command again");
-    case SQLITE_NOMEM:
-      throw StoreError(path + ": out of memory, this step was not saved" + detail +
-                       "; close other programs or raise the limit (ulimit -v), then give the same "
-                       "command again");
-    case SQLITE_BUSY:
-    case SQLITE_LOCKED:
-      throw StoreError(path + ": another program has locked it, this step was not saved" + detail +
-                       "; close that program, then start again");
-    case SQLITE_READONLY:
-    case SQLITE_PERM:
-    case SQLITE_AUTH:
-      throw StoreError(path + ": cannot be written" + detail +
-                       "; check the permissions of the file and its folder");
-    case SQLITE_CANTOPEN:
-      throw StoreError(path + ": cannot be opened" + detail +
-                       "; check that the file is there and that you may read and write it and its "
-                       "folder");
-    case SQLITE_IOERR:
-      throw StoreError(path + ": the disk reports an error, this step was not saved" + detail +
-                       "; check the disk and its free space before continuing");
-    default:
-      throw StoreError(path + ": this step was not saved" + detail);
-  }
-}
-
-std::string RowReader::column_name() const {
-  return columns_ != nullptr ? (*columns_)[static_cast<std::size_t>(index_)].getName()
-                             : statement_->getColumnName(index_);
-}
-
-void RowReader::missing() const {
-  throw SQLite::Exception(column_name() + " is missing", SQLITE_CORRUPT);
-}
-
-void RowReader::out_of_range(std::int64_t stored) const {
-  throw SQLite::Exception(column_name() + " is out of range: " + std::to_string(stored),
-                          SQLITE_CORRUPT);
-}
-
-std::vector<SQLite::Column> columns_of(SQLite::Statement& statement) {
-  std::vector<SQLite::Column> columns;
-  columns.reserve(static_cast<std::size_t>(statement.getColumnCount()));
-  for (int i = 0; i < statement.getColumnCount(); ++i) columns.push_back(statement.getColumn(i));
-  return columns;
-}
-
-namespace {
-
 constexpr const char* kLockEnd = ".palpate-lock";
 constexpr std::string_view kMark = "palpate ";  // and the process's number
 
@@ -247,6 +184,65 @@ bool is_locked(const std::string& file) {
 }
 
 }  // namespace
+
+void raise_store_error(const std::string& path, const SQLite::Exception& error) {
+  const std::string detail = std::string(" (SQLite: ") + error.what() + ")";
+  switch (cause_of(path, error)) {
+    case SQLITE_NOTADB:
+      throw StoreRefused(path + ": is not a palpate database" + detail +
+                         "; name another file, or restore it from a backup");
+    case SQLITE_CORRUPT:
+      throw StoreRefused(
+          path + ": is damaged or truncated" + detail + "; keep a copy of it and of " + path +
+          "-wal, then restore a backup or recover with: sqlite3 '" + path + "' .recover");
+    case SQLITE_FULL:
+      throw StoreError(path + ": " + full_disk(path) + ", this step was not saved" + detail +
+                       "; free some space or raise the limit, then give the same command again");
+    case SQLITE_NOMEM:
+      throw StoreError(path + ": out of memory, this step was not saved" + detail +
+                       "; close other programs or raise the limit (ulimit -v), then give the same "
+                       "command again");
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+      throw StoreError(path + ": another program has locked it, this step was not saved" + detail +
+                       "; close that program, then start again");
+    case SQLITE_READONLY:
+    case SQLITE_PERM:
+    case SQLITE_AUTH:
+      throw StoreError(path + ": cannot be written" + detail +
+                       "; check the permissions of the file and its folder");
+    case SQLITE_CANTOPEN:
+      throw StoreError(path + ": cannot be opened" + detail +
+                       "; check that the file is there and that you may read and write it and its "
+                       "folder");
+    case SQLITE_IOERR:
+      throw StoreError(path + ": the disk reports an error, this step was not saved" + detail +
+                       "; check the disk and its free space before continuing");
+    default:
+      throw StoreError(path + ": this step was not saved" + detail);
+  }
+}
+
+std::string RowReader::column_name() const {
+  return columns_ != nullptr ? (*columns_)[static_cast<std::size_t>(index_)].getName()
+                             : statement_->getColumnName(index_);
+}
+
+void RowReader::missing() const {
+  throw SQLite::Exception(column_name() + " is missing", SQLITE_CORRUPT);
+}
+
+void RowReader::out_of_range(std::int64_t stored) const {
+  throw SQLite::Exception(column_name() + " is out of range: " + std::to_string(stored),
+                          SQLITE_CORRUPT);
+}
+
+std::vector<SQLite::Column> columns_of(SQLite::Statement& statement) {
+  std::vector<SQLite::Column> columns;
+  columns.reserve(static_cast<std::size_t>(statement.getColumnCount()));
+  for (int i = 0; i < statement.getColumnCount(); ++i) columns.push_back(statement.getColumn(i));
+  return columns;
+}
 
 WriterLock::WriterLock(const std::string& path) : path_(path), file_(path + kLockEnd) {
   while (true) {

@@ -79,90 +79,6 @@ std::string keyed(const std::string& code, const std::string& secret) {
   return to_hex(sum);
 }
 
-}  // namespace
-
-Tombstones Tombstones::read(SQLite::Database& db, const std::string& path) {
-  Tombstones all;
-  const std::string cost = cost_of(new_salt());
-  SQLite::Statement find(db,
-                         "SELECT t.code_hash, s.secret FROM tombstones t LEFT JOIN "
-                         "tombstone_secrets s ON s.id = t.secret_id");
-  while (find.executeStep()) {
-    std::string hash;
-    std::optional<std::string> secret;
-    RowReader(find) >> hash >> secret;
-    const std::string salt = salt_of(hash);
-    const bool clean = std::all_of(hash.begin(), hash.end(), [](char c) {
-      return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
-             c == '$' || c == '.' || c == '/';
-    });
-    if (!clean || cost_of(salt) != cost || salt.size() == hash.size() || hash.size() > 200) {
-      throw StoreRefused(path + ": holds a tombstone that palpate did not make; restore a backup");
-    }
-    all.by_key_[{secret.value_or(""), salt}].push_back(hash);
-  }
-  return all;
-}
-
-Tombstones::Tombstone Tombstones::find(const std::string& code) const {
-  for (const auto& [key, hashes] : by_key_) {
-    std::string hash = hash_with(keyed(code, key.secret), key.salt);
-    if (std::find(hashes.begin(), hashes.end(), hash) != hashes.end()) return {hash, key.secret};
-  }
-  return {};
-}
-
-Tombstones::Tombstone Tombstones::made_for(const std::string& code) const {
-  const auto known = std::find_if(by_key_.begin(), by_key_.end(),
-                                  [](const auto& one) { return !one.first.secret.empty(); });
-  const Key key = known != by_key_.end() ? known->first : Key{new_secret(), new_salt()};
-  return {hash_with(keyed(code, key.secret), key.salt), key.secret};
-}
-
-void Tombstones::put(SQLite::Database& db, const Tombstone& tombstone, bool cleared) {
-  std::optional<std::int64_t> secret;
-  if (!tombstone.secret.empty()) {
-    const auto bind = [&](SQLite::Statement& statement) {
-      statement.bind(1, static_cast<const void*>(tombstone.secret.data()),
-                     static_cast<int>(tombstone.secret.size()));
-    };
-    SQLite::Statement keep(
-        db, "INSERT INTO tombstone_secrets (secret) VALUES (?) ON CONFLICT DO NOTHING");
-    bind(keep);
-    keep.exec();
-    SQLite::Statement find(db, "SELECT id FROM tombstone_secrets WHERE secret = ?");
-    bind(find);
-    find.executeStep();
-    secret = find.getColumn(0).getInt64();
-  }
-  SQLite::Statement add(db,
-                        "INSERT INTO tombstones (code_hash, secret_id, cleared) VALUES (?, ?, ?) "
-                        "ON CONFLICT (code_hash) DO UPDATE SET cleared = excluded.cleared, "
-                        "secret_id = excluded.secret_id");
-  Binder(add) << tombstone.hash << secret << cleared;
-  add.exec();
-}
-
-void Tombstones::add(const Tombstones& others) {
-  for (const auto& [key, hashes] : others.by_key_) {
-    auto& mine = by_key_[key];
-    for (const auto& hash : hashes) {
-      if (std::find(mine.begin(), mine.end(), hash) == mine.end()) mine.push_back(hash);
-    }
-  }
-}
-
-std::vector<Tombstones::Tombstone> Tombstones::all() const {
-  std::vector<Tombstone> all;
-  for (const auto& [key, hashes] : by_key_) {
-    for (const auto& hash : hashes) all.push_back({hash, key.secret});
-  }
-  std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.hash < b.hash; });
-  return all;
-}
-
-namespace {
-
 namespace fs = std::filesystem;
 
 constexpr std::uintmax_t kLargestText = std::uintmax_t{1} << 28U;  // bytes
@@ -293,40 +209,6 @@ class Search {
   int left_ = kMostEntries;
   std::uintmax_t bytes_ = 0;
 };
-
-}  // namespace
-
-bool mentions(const std::string& text, const std::string& code) {
-  for (std::size_t at = text.find(code); at != std::string::npos; at = text.find(code, at + 1)) {
-    const bool begins = at == 0 || !is_participant_code(text.substr(at - 1, 1));
-    const std::size_t end = at + code.size();
-    if (begins && (end == text.size() || !is_participant_code(text.substr(end, 1)))) return true;
-  }
-  return false;
-}
-
-std::vector<std::string> find_remaining_copies(const std::string& database, const std::string& code,
-                                               const std::vector<std::string>& known) {
-  std::set<fs::path> folders{fs::path(database).parent_path()};
-  std::set<fs::path> leave_out(known.begin(), known.end());
-  for (const char* end : {"", "-wal", "-shm", "-journal", ".palpate-lock"}) {
-    leave_out.insert(database + end);
-  }
-  for (const std::string& path : known) folders.insert(fs::path(path).parent_path());
-  Search search(code, database, std::move(leave_out));
-  for (const fs::path& folder : folders) search.beside(folder);
-  return search.found();
-}
-
-// Withdrawal: removes every byte of a participant from the database, its -wal and its backups, and
-// leaves a tombstone (forget.h). Order: one transaction deletes the rows (PRAGMA secure_delete
-// overwrites them with zeros) and inserts the tombstone; then a checkpoint truncates the -wal, and
-// VACUUM rebuilds the file; then backups are deleted; last, the tombstone is marked `cleared`.
-// After a crash at any point the same call finishes the rest.
-
-namespace {
-
-namespace fs = std::filesystem;
 
 constexpr const char* kParticipantIds = "(SELECT id FROM participants WHERE code = ?)";
 
@@ -473,6 +355,114 @@ std::int64_t notes_that_mention(SQLite::Database& db, const std::string& code) {
 }
 
 }  // namespace
+
+Tombstones Tombstones::read(SQLite::Database& db, const std::string& path) {
+  Tombstones all;
+  const std::string cost = cost_of(new_salt());
+  SQLite::Statement find(db,
+                         "SELECT t.code_hash, s.secret FROM tombstones t LEFT JOIN "
+                         "tombstone_secrets s ON s.id = t.secret_id");
+  while (find.executeStep()) {
+    std::string hash;
+    std::optional<std::string> secret;
+    RowReader(find) >> hash >> secret;
+    const std::string salt = salt_of(hash);
+    const bool clean = std::all_of(hash.begin(), hash.end(), [](char c) {
+      return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z') ||
+             c == '$' || c == '.' || c == '/';
+    });
+    if (!clean || cost_of(salt) != cost || salt.size() == hash.size() || hash.size() > 200) {
+      throw StoreRefused(path + ": holds a tombstone that palpate did not make; restore a backup");
+    }
+    all.by_key_[{secret.value_or(""), salt}].push_back(hash);
+  }
+  return all;
+}
+
+Tombstones::Tombstone Tombstones::find(const std::string& code) const {
+  for (const auto& [key, hashes] : by_key_) {
+    std::string hash = hash_with(keyed(code, key.secret), key.salt);
+    if (std::find(hashes.begin(), hashes.end(), hash) != hashes.end()) return {hash, key.secret};
+  }
+  return {};
+}
+
+Tombstones::Tombstone Tombstones::made_for(const std::string& code) const {
+  const auto known = std::find_if(by_key_.begin(), by_key_.end(),
+                                  [](const auto& one) { return !one.first.secret.empty(); });
+  const Key key = known != by_key_.end() ? known->first : Key{new_secret(), new_salt()};
+  return {hash_with(keyed(code, key.secret), key.salt), key.secret};
+}
+
+void Tombstones::put(SQLite::Database& db, const Tombstone& tombstone, bool cleared) {
+  std::optional<std::int64_t> secret;
+  if (!tombstone.secret.empty()) {
+    const auto bind = [&](SQLite::Statement& statement) {
+      statement.bind(1, static_cast<const void*>(tombstone.secret.data()),
+                     static_cast<int>(tombstone.secret.size()));
+    };
+    SQLite::Statement keep(
+        db, "INSERT INTO tombstone_secrets (secret) VALUES (?) ON CONFLICT DO NOTHING");
+    bind(keep);
+    keep.exec();
+    SQLite::Statement find(db, "SELECT id FROM tombstone_secrets WHERE secret = ?");
+    bind(find);
+    find.executeStep();
+    secret = find.getColumn(0).getInt64();
+  }
+  SQLite::Statement add(db,
+                        "INSERT INTO tombstones (code_hash, secret_id, cleared) VALUES (?, ?, ?) "
+                        "ON CONFLICT (code_hash) DO UPDATE SET cleared = excluded.cleared, "
+                        "secret_id = excluded.secret_id");
+  Binder(add) << tombstone.hash << secret << cleared;
+  add.exec();
+}
+
+void Tombstones::add(const Tombstones& others) {
+  for (const auto& [key, hashes] : others.by_key_) {
+    auto& mine = by_key_[key];
+    for (const auto& hash : hashes) {
+      if (std::find(mine.begin(), mine.end(), hash) == mine.end()) mine.push_back(hash);
+    }
+  }
+}
+
+std::vector<Tombstones::Tombstone> Tombstones::all() const {
+  std::vector<Tombstone> all;
+  for (const auto& [key, hashes] : by_key_) {
+    for (const auto& hash : hashes) all.push_back({hash, key.secret});
+  }
+  std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.hash < b.hash; });
+  return all;
+}
+
+bool mentions(const std::string& text, const std::string& code) {
+  for (std::size_t at = text.find(code); at != std::string::npos; at = text.find(code, at + 1)) {
+    const bool begins = at == 0 || !is_participant_code(text.substr(at - 1, 1));
+    const std::size_t end = at + code.size();
+    if (begins && (end == text.size() || !is_participant_code(text.substr(end, 1)))) return true;
+  }
+  return false;
+}
+
+std::vector<std::string> find_remaining_copies(const std::string& database, const std::string& code,
+                                               const std::vector<std::string>& known) {
+  std::set<fs::path> folders{fs::path(database).parent_path()};
+  std::set<fs::path> leave_out(known.begin(), known.end());
+  for (const char* end : {"", "-wal", "-shm", "-journal", ".palpate-lock"}) {
+    leave_out.insert(database + end);
+  }
+  for (const std::string& path : known) folders.insert(fs::path(path).parent_path());
+  Search search(code, database, std::move(leave_out));
+  for (const fs::path& folder : folders) search.beside(folder);
+  return search.found();
+}
+
+// Withdrawal: removes every byte of a participant from the database, its -wal and its backups, and
+// leaves a tombstone (forget.h). Order: one transaction deletes the rows (PRAGMA secure_delete
+// overwrites them with zeros) and inserts the tombstone; then a checkpoint truncates the -wal, and
+// VACUUM rebuilds the file; then backups are deleted; last, the tombstone is marked `cleared`.
+// After a crash at any point the same call finishes the rest.
 
 ParticipantSummary Store::participant_summary(const std::string& code) {
   return guarded(impl_->path, [&] {

@@ -27,6 +27,78 @@ void mark_replaced(std::vector<StoredPageAnswer>& answers) {
              .second;
 }
 
+[[noreturn]] void refuse_enrolment(const std::string& path, const std::string& why) {
+  throw StoreRefused(path + ": " + why);
+}
+
+void require_enrollable(const std::string& path, const ProtocolInfo& protocol,
+                        const std::string& code, std::optional<int> wanted_number, bool simulated,
+                        std::optional<std::uint64_t> seed) {
+  Validator validator;
+  validator.expect(
+      is_participant_code(code),
+      "the participant's code must be 1 to 32 letters (A-Z, a-z) and digits, a pseudonym");
+  if (wanted_number) validator.positive("the participant's number", *wanted_number);
+  validator.expect(simulated || !seed, "only a simulated participant has a seed");
+  validate(validator, protocol);
+  validator.throw_if_invalid(path + ": participant");
+}
+
+/// The participant with this code in the protocol. \throws StoreRefused: with another number, seed,
+/// or simulated instead of real.
+std::optional<Participant> find_enrolled(SQLite::Database& db, const std::string& path,
+                                         std::int64_t protocol, const Participant& wanted,
+                                         std::optional<int> number) {
+  SQLite::Statement find(
+      db,
+      "SELECT id, number, coalesce((SELECT enrolled_number FROM renumberings WHERE "
+      "participant_id = id), number), simulated, seed FROM participants WHERE protocol_id = ? "
+      "AND code = ?");
+  Binder(find) << protocol << wanted.code;
+  if (!find.executeStep()) return std::nullopt;
+  Participant person = wanted;
+  bool was_simulated = false;
+  std::optional<std::string> was_seed;
+  RowReader(find) >> person.id >> person.number >> person.enrolled_number >> was_simulated >>
+      was_seed;
+  if (number && *number != person.number && *number != person.enrolled_number) {
+    refuse_enrolment(path, "participant " + person.code + " has number " +
+                               std::to_string(person.number) + ", not " + std::to_string(*number) +
+                               "; leave the number out to continue");
+  }
+  if (was_simulated != person.simulated) {
+    refuse_enrolment(path, "participant " + person.code + " is " +
+                               (was_simulated ? "simulated" : "real") +
+                               " in this database; use another code or another database");
+  }
+  const auto text = person.seed ? std::optional(std::to_string(*person.seed)) : std::nullopt;
+  if (was_seed != text) {
+    refuse_enrolment(path, "participant " + person.code + " was simulated with seed " +
+                               was_seed.value_or("(none)") + ", not " + text.value_or("(none)") +
+                               "; use that seed or another database");
+  }
+  return person;
+}
+
+/// The wanted number, or the smallest unused one: gaps would unbalance the counterbalancing.
+int free_number(SQLite::Database& db, const std::string& path, std::optional<std::int64_t> protocol,
+                std::optional<int> wanted) {
+  SQLite::Statement numbers(
+      db, "SELECT number, code FROM participants WHERE protocol_id = ? ORDER BY number");
+  Binder(numbers) << protocol;
+  int next = 1;
+  while (numbers.executeStep()) {
+    const int number = numbers.getColumn(0).getInt();
+    if (wanted == number) {
+      refuse_enrolment(path, "number " + std::to_string(number) + " is taken by participant " +
+                                 numbers.getColumn(1).getString() +
+                                 "; leave the number out for the next unused one");
+    }
+    if (number == next) ++next;
+  }
+  return wanted.value_or(next);
+}
+
 }  // namespace
 
 void Store::add_page_answers(const Run& run, const std::vector<PageAnswer>& answers) {
@@ -102,82 +174,6 @@ std::vector<PageAnswer> Store::answers_in_force(const Participant& participant, 
 }
 
 // Enrolment in a protocol, codes and numbers.
-
-namespace {
-
-[[noreturn]] void refuse_enrolment(const std::string& path, const std::string& why) {
-  throw StoreRefused(path + ": " + why);
-}
-
-void require_enrollable(const std::string& path, const ProtocolInfo& protocol,
-                        const std::string& code, std::optional<int> wanted_number, bool simulated,
-                        std::optional<std::uint64_t> seed) {
-  Validator validator;
-  validator.expect(
-      is_participant_code(code),
-      "the participant's code must be 1 to 32 letters (A-Z, a-z) and digits, a pseudonym");
-  if (wanted_number) validator.positive("the participant's number", *wanted_number);
-  validator.expect(simulated || !seed, "only a simulated participant has a seed");
-  validate(validator, protocol);
-  validator.throw_if_invalid(path + ": participant");
-}
-
-/// The participant with this code in the protocol. \throws StoreRefused: with another number, seed,
-/// or simulated instead of real.
-std::optional<Participant> find_enrolled(SQLite::Database& db, const std::string& path,
-                                         std::int64_t protocol, const Participant& wanted,
-                                         std::optional<int> number) {
-  SQLite::Statement find(
-      db,
-      "SELECT id, number, coalesce((SELECT enrolled_number FROM renumberings WHERE "
-      "participant_id = id), number), simulated, seed FROM participants WHERE protocol_id = ? "
-      "AND code = ?");
-  Binder(find) << protocol << wanted.code;
-  if (!find.executeStep()) return std::nullopt;
-  Participant person = wanted;
-  bool was_simulated = false;
-  std::optional<std::string> was_seed;
-  RowReader(find) >> person.id >> person.number >> person.enrolled_number >> was_simulated >>
-      was_seed;
-  if (number && *number != person.number && *number != person.enrolled_number) {
-    refuse_enrolment(path, "participant " + person.code + " has number " +
-                               std::to_string(person.number) + ", not " + std::to_string(*number) +
-                               "; leave the number out to continue");
-  }
-  if (was_simulated != person.simulated) {
-    refuse_enrolment(path, "participant " + person.code + " is " +
-                               (was_simulated ? "simulated" : "real") +
-                               " in this database; use another code or another database");
-  }
-  const auto text = person.seed ? std::optional(std::to_string(*person.seed)) : std::nullopt;
-  if (was_seed != text) {
-    refuse_enrolment(path, "participant " + person.code + " was simulated with seed " +
-                               was_seed.value_or("(none)") + ", not " + text.value_or("(none)") +
-                               "; use that seed or another database");
-  }
-  return person;
-}
-
-/// The wanted number, or the smallest unused one: gaps would unbalance the counterbalancing.
-int free_number(SQLite::Database& db, const std::string& path, std::optional<std::int64_t> protocol,
-                std::optional<int> wanted) {
-  SQLite::Statement numbers(
-      db, "SELECT number, code FROM participants WHERE protocol_id = ? ORDER BY number");
-  Binder(numbers) << protocol;
-  int next = 1;
-  while (numbers.executeStep()) {
-    const int number = numbers.getColumn(0).getInt();
-    if (wanted == number) {
-      refuse_enrolment(path, "number " + std::to_string(number) + " is taken by participant " +
-                                 numbers.getColumn(1).getString() +
-                                 "; leave the number out for the next unused one");
-    }
-    if (number == next) ++next;
-  }
-  return wanted.value_or(next);
-}
-
-}  // namespace
 
 Participant Store::look_up(const ProtocolInfo& protocol, const std::string& code,
                            std::optional<int> wanted_number, bool simulated,

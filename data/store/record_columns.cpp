@@ -55,6 +55,21 @@ std::optional<double> amount_of(Whole) {
   return std::nullopt;
 }
 
+void validate_task(Validator& validator, const TaskRecord& task) {
+  validator.present("task", task.task);
+  validator.text("block_name", task.block_name);
+  validator.expect(task.of_block() || task.task == TaskRecord().task,
+                   "a task of no block must be identification");
+  validator.positive("track", task.track);
+  for (const auto& value : {task.level, task.standard_level, task.number, task.confidence}) {
+    if (value) validator.finite("a number of the task", *value);
+  }
+  for (const IntervalRecord& interval : task.intervals) {
+    validator.text("stimulus", interval.stimulus);
+    if (interval.level) validator.finite("level", *interval.level);
+  }
+}
+
 }  // namespace
 
 void require_valid_run(const StoredTrial& trial) {
@@ -283,25 +298,6 @@ void validate(Validator& validator, const PageAnswer& answer) {
   validator.text("answer", answer.answer);
   validator.expect(answer.text_sha256.size() == 64, "text_sha256 must be a SHA-256");
 }
-
-namespace {
-
-void validate_task(Validator& validator, const TaskRecord& task) {
-  validator.present("task", task.task);
-  validator.text("block_name", task.block_name);
-  validator.expect(task.of_block() || task.task == TaskRecord().task,
-                   "a task of no block must be identification");
-  validator.positive("track", task.track);
-  for (const auto& value : {task.level, task.standard_level, task.number, task.confidence}) {
-    if (value) validator.finite("a number of the task", *value);
-  }
-  for (const IntervalRecord& interval : task.intervals) {
-    validator.text("stimulus", interval.stimulus);
-    if (interval.level) validator.finite("level", *interval.level);
-  }
-}
-
-}  // namespace
 
 void validate_outcome(Validator& validator, const TrialRecord& record) {
   constexpr std::uint64_t kMost = std::numeric_limits<std::int64_t>::max();

@@ -71,23 +71,6 @@ std::map<std::string, std::string> expected_objects(int version) {
   return objects_of(db, "");
 }
 
-}  // namespace
-
-void verify_schema(SQLite::Database& db, const std::string& path, int version) {
-  const auto found = objects_of(db, path);
-  for (const auto& [name, sql] : expected_objects(version)) {
-    const auto object = found.find(name);
-    if (object != found.end() && object->second == sql) continue;
-    throw StoreRefused(
-        path + ": '" + name + "' " +
-        (object == found.end() ? "is missing" : "is not defined as palpate defines it") +
-        " in schema version " + std::to_string(version) +
-        "; the file is damaged or was changed, restore a backup");
-  }
-}
-
-namespace {
-
 void set_version(SQLite::Database& db, int version) {
   db.exec("PRAGMA user_version = " + std::to_string(version));
 }
@@ -129,6 +112,19 @@ std::string back_up(SQLite::Database& db, const std::string& path, int version) 
 }
 
 }  // namespace
+
+void verify_schema(SQLite::Database& db, const std::string& path, int version) {
+  const auto found = objects_of(db, path);
+  for (const auto& [name, sql] : expected_objects(version)) {
+    const auto object = found.find(name);
+    if (object != found.end() && object->second == sql) continue;
+    throw StoreRefused(
+        path + ": '" + name + "' " +
+        (object == found.end() ? "is missing" : "is not defined as palpate defines it") +
+        " in schema version " + std::to_string(version) +
+        "; the file is damaged or was changed, restore a backup");
+  }
+}
 
 std::span<const Migration> migrations() {
   static const std::vector<Migration> steps = [] {

@@ -45,6 +45,39 @@ void require_row(SQLite::Statement& find) {
   if (!find.executeStep()) throw SQLite::Exception("a row to be sealed is missing", SQLITE_CORRUPT);
 }
 
+Checksum finish_sum(sha256_ctx& context) {
+  Checksum sum;
+  sha256_digest(&context, sum.size(), sum.data());
+  return sum;
+}
+
+/// Number of measured columns that this version of the schema added.
+constexpr int measured_by(int version) {
+  int n = 0;
+  for (const MeasuredColumn& column : kMeasured) n += column.since == version ? 1 : 0;
+  return n;
+}
+
+template <class T>
+bool is_present(const T&) {
+  return true;
+}
+bool is_present(const std::optional<double>& value) { return value.has_value(); }
+
+/// Appends those columns, unless all are null. From version 5 on the version comes first, to
+/// distinguish the groups.
+void put_measured(SealedValues& out, const TrialRecord& record, int version) {
+  bool any = false;
+  for_each_measured(record, [&](const MeasuredColumn& column, const auto& value) {
+    if (column.since == version) any = any || is_present(value);
+  });
+  if (!any) return;
+  if (version > 4) out << version;
+  for_each_measured(record, [&](const MeasuredColumn& column, const auto& value) {
+    if (column.since == version) out << value;
+  });
+}
+
 }  // namespace
 
 /// The last link of a session in the database; or link 0 (the session itself) if there is none.
@@ -200,16 +233,6 @@ void SealWriter::seal_existing_rows() {
   }
 }
 
-namespace {
-
-Checksum finish_sum(sha256_ctx& context) {
-  Checksum sum;
-  sha256_digest(&context, sum.size(), sum.data());
-  return sum;
-}
-
-}  // namespace
-
 Checksum SealedValues::seal(const Checksum& previous) const {
   sha256_ctx context;
   sha256_init(&context);
@@ -251,37 +274,6 @@ void put_note(SealedValues& out, std::int64_t run_link, std::int64_t at_ns,
               const std::string& text) {
   out.begin("note") << run_link << at_ns << text;
 }
-
-namespace {
-
-/// Number of measured columns that this version of the schema added.
-constexpr int measured_by(int version) {
-  int n = 0;
-  for (const MeasuredColumn& column : kMeasured) n += column.since == version ? 1 : 0;
-  return n;
-}
-
-template <class T>
-bool is_present(const T&) {
-  return true;
-}
-bool is_present(const std::optional<double>& value) { return value.has_value(); }
-
-/// Appends those columns, unless all are null. From version 5 on the version comes first, to
-/// distinguish the groups.
-void put_measured(SealedValues& out, const TrialRecord& record, int version) {
-  bool any = false;
-  for_each_measured(record, [&](const MeasuredColumn& column, const auto& value) {
-    if (column.since == version) any = any || is_present(value);
-  });
-  if (!any) return;
-  if (version > 4) out << version;
-  for_each_measured(record, [&](const MeasuredColumn& column, const auto& value) {
-    if (column.since == version) out << value;
-  });
-}
-
-}  // namespace
 
 void put_attempt(SealedValues& out, const AttemptSealed& attempt, const TrialRecord& record) {
   out.begin("attempt") << attempt.run_link << record.trial << record.attempt << record.block

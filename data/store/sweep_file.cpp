@@ -34,6 +34,12 @@
 #include "data/sweep_record.h"
 
 namespace palpate::data {
+namespace {
+
+/// Columns of a row before its seal.
+int value_count(const SweepPlan& plan) {
+  return 5 + static_cast<int>(plan.parameters.size() + figure_columns(plan).size());
+}
 
 // Internal to data/store: tables and rows of a sweep's file.
 
@@ -44,15 +50,6 @@ struct SweepTables {
   Checksum seal{};      ///< of the plan
   int value_count = 0;  ///< columns of a row before its seal
 };
-
-/// Within a transaction, in an empty database: identity and version, table `sweep` with the plan in
-/// its only row, table `points` with a column for each parameter and figure. \throws StoreRefused:
-/// a name cannot be a column's
-SweepTables create_sweep_tables(SQLite::Database& db, const SweepPlan& plan);
-
-/// Checks version, integrity, tables (as made by create_sweep_tables) and all seals. \throws
-/// StoreRefused; SQLite::Exception.
-SweepTables read_sweep_tables(SQLite::Database& db, const std::string& path);
 
 /// Adds rows to a file of the current version.
 class SweepRowWriter {
@@ -65,19 +62,6 @@ class SweepRowWriter {
   const SweepTables& tables_;
   SQLite::Statement insert_, find_, seal_;
 };
-
-/// Computes the seal from the values of the current row of a SELECT *, of either version.
-Checksum seal_of_row(SQLite::Statement& row, const SweepTables& tables);
-/// Verifies the row's seal. \throws StoreRefused, naming the row
-void require_sealed(SQLite::Statement& row, const SweepTables& tables, const std::string& path);
-/// Reads and verifies the current row of a SELECT *.
-SweepRow read_sweep_row(SQLite::Statement& row, const SweepTables& tables, const std::string& path);
-
-std::string insert_sweep_row_sql(const SweepPlan& plan);
-/// Binds the columns of a row of either version, and its seal.
-void copy_row(SQLite::Statement& row, const Checksum& seal, SQLite::Statement& insert);
-
-namespace {
 
 constexpr int kPlanColumns = 12;  // before its seal
 
@@ -140,11 +124,6 @@ int known_version(SQLite::Database& db, const std::string& path) {
   throw StoreRefused(path + ": " + row +
                      " does not match its checksum: the file is damaged or was changed; restore a "
                      "backup, or run the sweep again: the same plan gives the same results");
-}
-
-/// Columns of a row before its seal.
-int value_count(const SweepPlan& plan) {
-  return 5 + static_cast<int>(plan.parameters.size() + figure_columns(plan).size());
 }
 
 /// The values of a row, each with its type. \param count  of columns, from the first
@@ -218,8 +197,9 @@ SweepTables tables_of(SQLite::Database& db, const std::string& path, int version
   return tables;
 }
 
-}  // namespace
-
+/// Within a transaction, in an empty database: identity and version, table `sweep` with the plan in
+/// its only row, table `points` with a column for each parameter and figure. \throws StoreRefused:
+/// a name cannot be a column's
 SweepTables create_sweep_tables(SQLite::Database& db, const SweepPlan& plan) {
   db.exec(sweep_table(kSweepVersion));
   db.exec(points_table(plan, kSweepVersion));
@@ -243,6 +223,22 @@ SweepTables create_sweep_tables(SQLite::Database& db, const SweepPlan& plan) {
   return tables;
 }
 
+/// Computes the seal from the values of the current row of a SELECT *, of either version.
+Checksum seal_of_row(SQLite::Statement& row, const SweepTables& tables) {
+  SealedValues values;
+  values.begin("point");
+  put_values(values, row, tables.value_count);
+  return values.seal(tables.seal);
+}
+
+/// Verifies the row's seal. \throws StoreRefused, naming the row
+void require_sealed(SQLite::Statement& row, const SweepTables& tables, const std::string& path) {
+  if (tables.version < kSealsSince || stored_seal(row) == seal_of_row(row, tables)) return;
+  refuse_seal(path, "point " + std::to_string(row.getColumn(0).getInt64()));
+}
+
+/// Checks version, integrity, tables (as made by create_sweep_tables) and all seals. \throws
+/// StoreRefused; SQLite::Exception.
 SweepTables read_sweep_tables(SQLite::Database& db, const std::string& path) {
   const int version = known_version(db, path);
   const auto refuse = [&](const char* why) {
@@ -304,18 +300,7 @@ void SweepRowWriter::add(const SweepRow& row) {
   seal_.reset();
 }
 
-Checksum seal_of_row(SQLite::Statement& row, const SweepTables& tables) {
-  SealedValues values;
-  values.begin("point");
-  put_values(values, row, tables.value_count);
-  return values.seal(tables.seal);
-}
-
-void require_sealed(SQLite::Statement& row, const SweepTables& tables, const std::string& path) {
-  if (tables.version < kSealsSince || stored_seal(row) == seal_of_row(row, tables)) return;
-  refuse_seal(path, "point " + std::to_string(row.getColumn(0).getInt64()));
-}
-
+/// Reads and verifies the current row of a SELECT *.
 SweepRow read_sweep_row(SQLite::Statement& row, const SweepTables& tables,
                         const std::string& path) {
   require_sealed(row, tables, path);
@@ -343,6 +328,7 @@ SweepRow read_sweep_row(SQLite::Statement& row, const SweepTables& tables,
   return out;
 }
 
+/// Binds the columns of a row of either version, and its seal.
 void copy_row(SQLite::Statement& row, const Checksum& seal, SQLite::Statement& insert) {
   const int values = insert.getBindParameterCount() - 1;
   for (int i = 0; i < values; ++i) {
@@ -363,8 +349,6 @@ void copy_row(SQLite::Statement& row, const Checksum& seal, SQLite::Statement& i
   }
   insert.bind(values + 1, seal.data(), static_cast<int>(seal.size()));
 }
-
-namespace {
 
 namespace fs = std::filesystem;
 

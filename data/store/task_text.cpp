@@ -41,6 +41,9 @@ IntervalRecord interval_of(const Json& in) {
   return interval;
 }
 
+/// Only the point renderer has no side; it gives force only.
+bool gives_torque(const std::string& renderer) { return !renderer.empty() && renderer != "point"; }
+
 }  // namespace
 
 std::optional<std::string> task_text(const TaskRecord& task) {
@@ -84,13 +87,6 @@ TaskRecord parse_task_text(const std::string& text) {
     throw std::invalid_argument(std::string("its task is damaged: ") + error.what());
   }
 }
-
-namespace {
-
-/// Only the point renderer has no side; it gives force only.
-bool gives_torque(const std::string& renderer) { return !renderer.empty() && renderer != "point"; }
-
-}  // namespace
 
 TorqueNotes::TorqueNotes(Store& store) {
   for (const StoredNote& note : store.notes()) {

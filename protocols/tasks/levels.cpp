@@ -50,6 +50,28 @@ stimuli::ObjectSpec read_again(const json& value, const Protocol& protocol,
   return object;
 }
 
+/// Endings of names, and the unit that each stands for.
+constexpr std::array<std::pair<std::string_view, const char*>, 7> kUnits = {
+    {{"_n_per_m", "N/m"},
+     {"_ns_per_m", "N s/m"},
+     {"_n", "N"},
+     {"_kg_per_m3", "kg/m^3"},
+     {"_kg", "kg"},
+     {"_pa", "Pa"},
+     {"_m", "m"}}};
+
+/// Without list indices: /size_m/0.
+std::string named_part(std::string path) {
+  while (!path.empty() && path.back() >= '0' && path.back() <= '9') path.pop_back();
+  if (path.ends_with('/')) path.pop_back();
+  return path;
+}
+
+double guesses_of(const TaskBlock& block, const TypicalSettings& settings, bool both_sides) {
+  if (block.task != TaskKind::compare || block.same_different) return settings.false_alarm;
+  return both_sides ? settings.lapse : 1.0 / block.intervals;
+}
+
 }  // namespace
 
 std::string level_text(double level) {
@@ -121,27 +143,6 @@ std::vector<double> levels_of(const TaskBlock& block) {
   return levels;
 }
 
-namespace {
-
-/// Endings of names, and the unit that each stands for.
-constexpr std::array<std::pair<std::string_view, const char*>, 7> kUnits = {
-    {{"_n_per_m", "N/m"},
-     {"_ns_per_m", "N s/m"},
-     {"_n", "N"},
-     {"_kg_per_m3", "kg/m^3"},
-     {"_kg", "kg"},
-     {"_pa", "Pa"},
-     {"_m", "m"}}};
-
-/// Without list indices: /size_m/0.
-std::string named_part(std::string path) {
-  while (!path.empty() && path.back() >= '0' && path.back() <= '9') path.pop_back();
-  if (path.ends_with('/')) path.pop_back();
-  return path;
-}
-
-}  // namespace
-
 std::string unit_of_level(const std::string& of) {
   const std::string path = named_part(of);
   if (path.ends_with("/orientation")) return "deg";
@@ -188,15 +189,6 @@ Protocol with_all_levels(const Protocol& protocol) {
   }
   return all;
 }
-
-namespace {
-
-double guesses_of(const TaskBlock& block, const TypicalSettings& settings, bool both_sides) {
-  if (block.task != TaskKind::compare || block.same_different) return settings.false_alarm;
-  return both_sides ? settings.lapse : 1.0 / block.intervals;
-}
-
-}  // namespace
 
 std::optional<Easier> easier_of(const ProcedureSpec& spec) {
   if (const auto* staircase = std::get_if<Staircase>(&spec)) return staircase->easier;

@@ -21,13 +21,6 @@
 #include "protocols/tasks/task_plan.h"
 
 namespace palpate::protocols {
-
-// Reads the possible answers in a block.
-
-/// Reads keys, scale or range, and confidence of a block whose task has been read. Every answer of
-/// the task has one key; by default 1, 2, ... in order.
-void read_answers(ObjectReader& reader, const Protocol& protocol, TaskBlock& block);
-
 namespace {
 
 using nlohmann::json;
@@ -90,27 +83,6 @@ std::vector<TaskAnswer> answers_of(const Protocol& protocol, const TaskBlock& bl
   }
   return answers;
 }
-
-}  // namespace
-
-std::vector<ScaleStep> read_scale_steps(ObjectReader& reader, const char* key, Presence presence) {
-  std::vector<ScaleStep> steps;
-  const json* const list = reader.array(key, 2, kMostSteps, presence);
-  if (list == nullptr) return steps;
-  for (std::size_t i = 0; i < list->size(); ++i) {
-    ObjectReader item((*list)[i], child_pointer(reader.pointer(key), i), reader.faults());
-    ScaleStep step{static_cast<double>(i + 1), ""};
-    item.number("number", step.number, kScaleNumber);
-    read_label(item, "label", step.label, Presence::required);
-    item.refuse_unknown_keys();
-    if (!steps.empty() && step.number <= steps.back().number)
-      reader.faults().add(item.pointer("number"), "expected more than the step before");
-    steps.push_back(std::move(step));
-  }
-  return steps;
-}
-
-namespace {
 
 /// 1, 2, ..., 9, 0, then letters: a separate key for each step.
 std::string step_key(std::size_t i) {
@@ -229,8 +201,7 @@ const char* answers_key(TaskKind task) {
   return task == TaskKind::external ? "answers" : "keys";
 }
 
-}  // namespace
-
+// Reads the possible answers in a block.
 void read_answers(ObjectReader& reader, const Protocol& protocol, TaskBlock& block) {
   if (block.task == TaskKind::rate) {
     read_rating(reader, block);
@@ -254,10 +225,6 @@ void read_answers(ObjectReader& reader, const Protocol& protocol, TaskBlock& blo
     confidence.scale = read_scale_steps(section, "scale", Presence::required);
   });
 }
-
-// Checks that the blocks of a protocol can be shown.
-
-namespace {
 
 constexpr long long kMostTaskTrials = 1000000;
 
@@ -314,41 +281,6 @@ void check_easier(const Protocol& protocol, const TaskBlock& block, const std::s
                         "that chooses the comparison"));
   }
 }
-
-}  // namespace
-
-void check_blocks(const Protocol& protocol, FaultList& faults) {
-  for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
-    const TaskBlock& block = protocol.blocks[i];
-    check_levels_of(protocol, block, pointer_of_block(i), faults);
-    if (block.level && block.task != TaskKind::detect && block.standard &&
-        !own_level(protocol, block, *block.standard)) {
-      faults.add(pointer_of_block(i) + "/standard",
-                 "expected a stimulus that has " + block.level->pointer + " itself");
-    }
-  }
-  faults.throw_if_any();
-  for (std::size_t i = 0; i < protocol.blocks.size(); ++i)
-    check_easier(protocol, protocol.blocks[i], pointer_of_block(i), faults);
-  long long trials = 0;
-  for (const TaskBlock& block : protocol.blocks) trials += most_trials_of(block);
-  if (trials > kMostTaskTrials) {
-    faults.add("/blocks", "expected at most " + std::to_string(kMostTaskTrials) +
-                              " trials for each participant, found " + std::to_string(trials));
-    return;
-  }
-  for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
-    try {
-      check_order(protocol, static_cast<int>(i));
-    } catch (const ScheduleError& error) {
-      faults.add(pointer_of_block(i) + "/order", error.what());
-    }
-  }
-}
-
-namespace {
-
-using nlohmann::json;
 
 constexpr std::size_t kMaxBlocks = 100;
 constexpr NumberRange kAnyNumber{-1e9, 1e9};
@@ -687,6 +619,54 @@ void check_sessions(const Protocol& protocol, FaultList& faults) {
 }
 
 }  // namespace
+
+std::vector<ScaleStep> read_scale_steps(ObjectReader& reader, const char* key, Presence presence) {
+  std::vector<ScaleStep> steps;
+  const json* const list = reader.array(key, 2, kMostSteps, presence);
+  if (list == nullptr) return steps;
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    ObjectReader item((*list)[i], child_pointer(reader.pointer(key), i), reader.faults());
+    ScaleStep step{static_cast<double>(i + 1), ""};
+    item.number("number", step.number, kScaleNumber);
+    read_label(item, "label", step.label, Presence::required);
+    item.refuse_unknown_keys();
+    if (!steps.empty() && step.number <= steps.back().number)
+      reader.faults().add(item.pointer("number"), "expected more than the step before");
+    steps.push_back(std::move(step));
+  }
+  return steps;
+}
+
+// Checks that the blocks of a protocol can be shown.
+
+void check_blocks(const Protocol& protocol, FaultList& faults) {
+  for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
+    const TaskBlock& block = protocol.blocks[i];
+    check_levels_of(protocol, block, pointer_of_block(i), faults);
+    if (block.level && block.task != TaskKind::detect && block.standard &&
+        !own_level(protocol, block, *block.standard)) {
+      faults.add(pointer_of_block(i) + "/standard",
+                 "expected a stimulus that has " + block.level->pointer + " itself");
+    }
+  }
+  faults.throw_if_any();
+  for (std::size_t i = 0; i < protocol.blocks.size(); ++i)
+    check_easier(protocol, protocol.blocks[i], pointer_of_block(i), faults);
+  long long trials = 0;
+  for (const TaskBlock& block : protocol.blocks) trials += most_trials_of(block);
+  if (trials > kMostTaskTrials) {
+    faults.add("/blocks", "expected at most " + std::to_string(kMostTaskTrials) +
+                              " trials for each participant, found " + std::to_string(trials));
+    return;
+  }
+  for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
+    try {
+      check_order(protocol, static_cast<int>(i));
+    } catch (const ScheduleError& error) {
+      faults.add(pointer_of_block(i) + "/order", error.what());
+    }
+  }
+}
 
 void read_blocks(ObjectReader& reader, Protocol& protocol) {
   reader.choice("block_order", protocol.blocks_counterbalanced,

@@ -93,30 +93,6 @@ void read_mapping(ObjectReader& reader, const char* key, std::map<std::string, s
   }
 }
 
-}  // namespace
-
-void read_periphery(ObjectReader& reader, Protocol& protocol) {
-  reader.section("sounds", [&](ObjectReader& section) {
-    Sounds& sounds = protocol.sounds.emplace();
-    section.boolean("ready", sounds.ready);
-    section.boolean("go", sounds.go);
-    section.boolean("feedback", sounds.feedback);
-    section.number("level_db", sounds.level_db, {-80, -12, "dB"});
-  });
-  reader.section("responses", [&](ObjectReader& section) {
-    read_mapping(section, "joystick", protocol.responses.joystick, is_joystick_input,
-                 "expected 'button N', 'axis N +', 'axis N -' or 'hat N up', 'down', 'left', "
-                 "'right', N from 1");
-    read_mapping(section, "box", protocol.responses.box, is_box_byte,
-                 "expected a printable character, or a byte as '0x00' to '0xff'");
-    check_bytes(section, protocol.responses.box);
-  });
-}
-
-namespace {
-
-using nlohmann::json;
-
 constexpr std::size_t kMostPages = 100, kMostItems = 100, kMostChoices = 20;
 constexpr NumberRange kPageNumber{-1e12, 1e12};
 constexpr std::uintmax_t kMostPictureBytes = 8 << 20;
@@ -343,6 +319,24 @@ void refuse_repeated_columns(ObjectReader& reader, const Protocol& protocol) {
 }
 
 }  // namespace
+
+void read_periphery(ObjectReader& reader, Protocol& protocol) {
+  reader.section("sounds", [&](ObjectReader& section) {
+    Sounds& sounds = protocol.sounds.emplace();
+    section.boolean("ready", sounds.ready);
+    section.boolean("go", sounds.go);
+    section.boolean("feedback", sounds.feedback);
+    section.number("level_db", sounds.level_db, {-80, -12, "dB"});
+  });
+  reader.section("responses", [&](ObjectReader& section) {
+    read_mapping(section, "joystick", protocol.responses.joystick, is_joystick_input,
+                 "expected 'button N', 'axis N +', 'axis N -' or 'hat N up', 'down', 'left', "
+                 "'right', N from 1");
+    read_mapping(section, "box", protocol.responses.box, is_box_byte,
+                 "expected a printable character, or a byte as '0x00' to '0xff'");
+    check_bytes(section, protocol.responses.box);
+  });
+}
 
 void read_pages(ObjectReader& reader, Protocol& protocol, const MeshFiles& files) {
   const json* const list = reader.array("pages", 0, kMostPages);

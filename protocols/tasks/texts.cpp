@@ -113,23 +113,6 @@ void check_translation(const TextPlace& place, const json& value, FaultList& fau
   }
 }
 
-}  // namespace
-
-std::vector<std::pair<std::string, std::string>> texts_of(const Protocol& protocol) {
-  Protocol copy = protocol;
-  std::vector<std::pair<std::string, std::string>> texts;
-  for (const TextPlace& place : TextPlaces(copy).take()) texts.emplace_back(place.key, *place.text);
-  return texts;
-}
-
-std::string texts_json(const Protocol& protocol) {
-  nlohmann::ordered_json all;
-  for (const auto& [key, text] : texts_of(protocol)) all[key] = text;
-  return all.dump(1, ' ', false, json::error_handler_t::replace) + "\n";
-}
-
-namespace {
-
 /// The program's own texts that a participant may read.
 struct TextsRead {
   explicit TextsRead(const Protocol& protocol) : tasks(protocol.version == 2) {
@@ -169,6 +152,19 @@ bool is_built_in_answer(const TaskBlock& block, const TaskAnswer& answer) {
 }
 
 }  // namespace
+
+std::vector<std::pair<std::string, std::string>> texts_of(const Protocol& protocol) {
+  Protocol copy = protocol;
+  std::vector<std::pair<std::string, std::string>> texts;
+  for (const TextPlace& place : TextPlaces(copy).take()) texts.emplace_back(place.key, *place.text);
+  return texts;
+}
+
+std::string texts_json(const Protocol& protocol) {
+  nlohmann::ordered_json all;
+  for (const auto& [key, text] : texts_of(protocol)) all[key] = text;
+  return all.dump(1, ' ', false, json::error_handler_t::replace) + "\n";
+}
 
 std::vector<std::string> built_in_texts(const Protocol& protocol) {
   std::vector<std::string> found;

@@ -254,19 +254,6 @@ BodyCase collisions() {
   return c;
 }
 
-}  // namespace
-
-std::vector<BodyCase> body_cases(bool quick) {
-  return {tumbling(quick), coin(),
-          head_on(),       oblique(),
-          rod(),           plank(),
-          cradle(),        tumbling_bounces(quick),
-          collisions(),    heavy_on_light(quick),
-          stack(quick)};
-}
-
-namespace {
-
 constexpr double kStudyStep = 1e-3;  // s
 
 BodyRow measure_bodies(const BodyCase& of, const BodyEngineKind& kind,
@@ -296,6 +283,90 @@ std::shared_ptr<const stimuli::ConvexMesh> mesh_from(const stimuli::PolygonSoup&
   return std::make_shared<const stimuli::ConvexMesh>(soup);
 }
 
+constexpr double kYoungModulus = 20000, kPoissonRatio = 0.45;  // Pa; a soft tissue
+
+using Clock = std::function<double()>;
+
+SoftRow row_of(std::string name, std::string truth, const stimuli::SolidMesh& mesh, double value,
+               double reference, std::string unit) {
+  return {std::move(name), std::move(truth), mesh.nodes.size(), mesh.hexahedra.size(),
+          value,           reference,        std::move(unit),   std::abs(value / reference - 1)};
+}
+
+/// A slab on a table with a tool on it.
+struct PressedSlab {
+  std::shared_ptr<const SoftBody> body;
+  double force = 0;  ///< N
+  double sunk = 0;   ///< m, of the ideal tool
+  double step_ns = 0;
+};
+constexpr double kStepTime = 0.004;  // s
+
+std::vector<std::uint32_t> nodes_where(const stimuli::SolidMesh& mesh,
+                                       const std::function<bool(const Vec3&)>& is) {
+  std::vector<std::uint32_t> nodes;
+  for (std::uint32_t i = 0; i < mesh.nodes.size(); ++i) {
+    if (is(mesh.nodes[i])) nodes.push_back(i);
+  }
+  return nodes;
+}
+
+/// \param half  m, of the slab's height
+/// \param goal  m, depth of the virtual tool
+PressedSlab press_slab(stimuli::SolidMesh mesh, double half, double poisson,
+                       const SoftContactSettings& contact, const PlacedTool& tool,
+                       const Vec3& above, double goal, const Clock& now) {
+  const auto held = nodes_where(mesh, [&](const Vec3& p) { return p.z < -0.999 * half; });
+  PressedSlab pressed;
+  pressed.body = std::make_shared<const SoftBody>(
+      std::move(mesh), held,
+      SoftSettings{.material = {.young = kYoungModulus, .poisson = poisson}, .step = kStepTime});
+  const SoftObject object(pressed.body, contact, 0);
+  SoftObjectState state = initial_state(object);
+  Vec3 at = above;
+  at.z = half + contact.radius + 0.0005;
+  constexpr double kTick = 0.001, kFall = 2e-5;
+  const int ticks = static_cast<int>(goal / kFall) + 500;
+  for (int i = 0; i < ticks; ++i) {
+    const double step = std::max(-kFall, half + contact.radius - goal - at.z);
+    at.z += step;
+    pressed.force = advance(object, state, at, tool, std::abs(step), kTick).z;
+  }
+  pressed.sunk = goal - state.contact.shift.z;
+  constexpr int kTimed = 20;
+  const double start = now();
+  for (int i = 0; i < kTimed; ++i) pressed.body->step(state.body, state.mean);
+  pressed.step_ns = (now() - start) / kTimed;
+  return pressed;
+}
+
+stimuli::SolidMesh box_mesh(const Vec3& size, int resolution) {
+  stimuli::ObjectSpec spec;
+  spec.shape = stimuli::ShapeKind::box;
+  spec.size = size;
+  return stimuli::mesh_of_primitive(spec, resolution);
+}
+
+SoftRow ball(int resolution, const Clock& now) {
+  constexpr double kBall = 0.02, kHigh = 0.05;
+  PlacedTool tool;
+  tool.count = 1;
+  tool.segments[0] = {Vec3(0), Vec3(0)};
+  const PressedSlab pressed = press_slab(
+      box_mesh({0.1, 0.1, kHigh}, resolution), kHigh / 2, kPoissonRatio,
+      {.radius = kBall, .stiffness = 1e5, .most = 128}, tool, {0.0003, 0.0002, 0}, 0.004, now);
+  // Dimitriadis et al. 2002, bonded to its base, for incompressible layers; Hertz for thick ones.
+  const double x = std::sqrt(kBall * pressed.sunk) / kHigh;
+  const double thin = 1 + x * (1.133 + x * (1.283 + x * (0.769 + x * 0.0975)));
+  const double hertz = 4.0 / 3 * kYoungModulus / (1 - kPoissonRatio * kPoissonRatio) *
+                       std::sqrt(kBall) * std::pow(pressed.sunk, 1.5) * thin;
+  SoftRow row =
+      row_of("ball on a slab, resolution " + std::to_string(resolution),
+             "Hertz with the slab's thickness", pressed.body->mesh(), pressed.force, hertz, "N");
+  row.step_ns = pressed.step_ns;
+  return row;
+}
+
 Parts dumbbell() {
   const auto ball = mesh_from(stimuli::icosphere(0.015, 3));
   const auto bar = mesh_from(stimuli::cylinder(0.005, 0.06, 24));
@@ -315,87 +386,6 @@ Parts rocket() {
         {mesh_from(stimuli::box({0.03, 0.004, 0.04})), {turn * Vec3(0.03, 0, -0.06), turn}});
   }
   return parts;
-}
-
-}  // namespace
-
-std::vector<BodyRow> body_study(bool quick, const std::function<double()>& now,
-                                const std::function<void(double)>& progress) {
-  std::vector<BodyRow> rows;
-  const std::vector<BodyCase> cases = body_cases(quick);
-  const std::vector<BodyEngineKind> engines = body_engines();
-  for (const BodyCase& of : cases) {
-    for (const BodyEngineKind& engine : engines) {
-      progress(static_cast<double>(rows.size()) /
-               static_cast<double>(cases.size() * engines.size()));
-      rows.push_back(measure_bodies(of, engine, now));
-    }
-  }
-  return rows;
-}
-
-BodyTickCost body_tick_cost(bool quick, const std::function<double()>& now) {
-  std::vector<SceneObject> objects;
-  std::vector<MovingObject> moving;
-  for (int i = 0; i < 11; ++i) {
-    MovingObject object;
-    object.object = i;
-    object.body.mass = 0.1;
-    object.body.restitution = 0.8;
-    object.pose.position = {0.06 * (i % 4), 0.06 * ((i / 4) % 4), i == 10 ? 0.12 : 0.005 * i};
-    object.body.damping = 0.2;
-    for (const auto& [mesh, at] : i == 10 ? rocket() : dumbbell()) {
-      SceneObject part;
-      part.mesh = mesh;
-      part.object = i;
-      part.pose = {object.pose.position + at.position, at.orientation};
-      objects.push_back(part);
-    }
-    moving.push_back(object);
-  }
-  const Scene scene = moving_scene(objects, moving, Vec3(0));
-  RenderState state = scene.initial_state();
-  const int ticks = quick ? 2000 : 20000;
-  std::vector<double> costs;
-  for (int i = 0; i < ticks; ++i) {
-    // The hand follows one body and pushes it.
-    const BodyPose& body =
-        state.motion.bodies()[static_cast<std::size_t>(i / 400) % state.motion.bodies().size()];
-    const double phase = (i % 400) / 400.0;
-    const Vec3 tip = body.centre + Vec3(0.08 - 0.09 * phase, 0.01 * std::sin(0.01 * i), 0.01);
-    const double start = now();
-    ray_renderer().tick(scene, state, {tip, tip + Vec3(0.12, 0.02, 0.01)}, 1e-3);
-    costs.push_back(1e-3 * (now() - start));
-  }
-  std::sort(costs.begin(), costs.end());
-  BodyTickCost cost;
-  cost.ticks = costs.size();
-  cost.median = costs[costs.size() / 2];
-  cost.p99 = costs[costs.size() * 99 / 100];
-  cost.most = costs.back();
-  return cost;
-}
-
-namespace {
-
-constexpr double kYoungModulus = 20000, kPoissonRatio = 0.45;  // Pa; a soft tissue
-constexpr double kStepTime = 0.004;                            // s
-
-using Clock = std::function<double()>;
-
-std::vector<std::uint32_t> nodes_where(const stimuli::SolidMesh& mesh,
-                                       const std::function<bool(const Vec3&)>& is) {
-  std::vector<std::uint32_t> nodes;
-  for (std::uint32_t i = 0; i < mesh.nodes.size(); ++i) {
-    if (is(mesh.nodes[i])) nodes.push_back(i);
-  }
-  return nodes;
-}
-
-SoftRow row_of(std::string name, std::string truth, const stimuli::SolidMesh& mesh, double value,
-               double reference, std::string unit) {
-  return {std::move(name), std::move(truth), mesh.nodes.size(), mesh.hexahedra.size(),
-          value,           reference,        std::move(unit),   std::abs(value / reference - 1)};
 }
 
 SoftRow patch_test() {
@@ -451,70 +441,6 @@ SoftRow cantilever(int across, const Clock& now) {
   SoftRow row = row_of("cantilever, " + std::to_string(across) + " across", "Timoshenko's beam",
                        mesh, 1000 * sum / static_cast<double>(loaded.size()), 1000 * theory, "mm");
   row.step_ns = spent / kSteps;
-  return row;
-}
-
-/// A slab on a table with a tool on it.
-struct PressedSlab {
-  std::shared_ptr<const SoftBody> body;
-  double force = 0;  ///< N
-  double sunk = 0;   ///< m, of the ideal tool
-  double step_ns = 0;
-};
-
-/// \param half  m, of the slab's height
-/// \param goal  m, depth of the virtual tool
-PressedSlab press_slab(stimuli::SolidMesh mesh, double half, double poisson,
-                       const SoftContactSettings& contact, const PlacedTool& tool,
-                       const Vec3& above, double goal, const Clock& now) {
-  const auto held = nodes_where(mesh, [&](const Vec3& p) { return p.z < -0.999 * half; });
-  PressedSlab pressed;
-  pressed.body = std::make_shared<const SoftBody>(
-      std::move(mesh), held,
-      SoftSettings{.material = {.young = kYoungModulus, .poisson = poisson}, .step = kStepTime});
-  const SoftObject object(pressed.body, contact, 0);
-  SoftObjectState state = initial_state(object);
-  Vec3 at = above;
-  at.z = half + contact.radius + 0.0005;
-  constexpr double kTick = 0.001, kFall = 2e-5;
-  const int ticks = static_cast<int>(goal / kFall) + 500;
-  for (int i = 0; i < ticks; ++i) {
-    const double step = std::max(-kFall, half + contact.radius - goal - at.z);
-    at.z += step;
-    pressed.force = advance(object, state, at, tool, std::abs(step), kTick).z;
-  }
-  pressed.sunk = goal - state.contact.shift.z;
-  constexpr int kTimed = 20;
-  const double start = now();
-  for (int i = 0; i < kTimed; ++i) pressed.body->step(state.body, state.mean);
-  pressed.step_ns = (now() - start) / kTimed;
-  return pressed;
-}
-
-stimuli::SolidMesh box_mesh(const Vec3& size, int resolution) {
-  stimuli::ObjectSpec spec;
-  spec.shape = stimuli::ShapeKind::box;
-  spec.size = size;
-  return stimuli::mesh_of_primitive(spec, resolution);
-}
-
-SoftRow ball(int resolution, const Clock& now) {
-  constexpr double kBall = 0.02, kHigh = 0.05;
-  PlacedTool tool;
-  tool.count = 1;
-  tool.segments[0] = {Vec3(0), Vec3(0)};
-  const PressedSlab pressed = press_slab(
-      box_mesh({0.1, 0.1, kHigh}, resolution), kHigh / 2, kPoissonRatio,
-      {.radius = kBall, .stiffness = 1e5, .most = 128}, tool, {0.0003, 0.0002, 0}, 0.004, now);
-  // Dimitriadis et al. 2002, bonded to its base, for incompressible layers; Hertz for thick ones.
-  const double x = std::sqrt(kBall * pressed.sunk) / kHigh;
-  const double thin = 1 + x * (1.133 + x * (1.283 + x * (0.769 + x * 0.0975)));
-  const double hertz = 4.0 / 3 * kYoungModulus / (1 - kPoissonRatio * kPoissonRatio) *
-                       std::sqrt(kBall) * std::pow(pressed.sunk, 1.5) * thin;
-  SoftRow row =
-      row_of("ball on a slab, resolution " + std::to_string(resolution),
-             "Hertz with the slab's thickness", pressed.body->mesh(), pressed.force, hertz, "N");
-  row.step_ns = pressed.step_ns;
   return row;
 }
 
@@ -607,6 +533,72 @@ void add_pressed(const Clock& now, std::vector<SoftRow>& rows) {
 }
 
 }  // namespace
+
+std::vector<BodyCase> body_cases(bool quick) {
+  return {tumbling(quick), coin(),
+          head_on(),       oblique(),
+          rod(),           plank(),
+          cradle(),        tumbling_bounces(quick),
+          collisions(),    heavy_on_light(quick),
+          stack(quick)};
+}
+
+std::vector<BodyRow> body_study(bool quick, const std::function<double()>& now,
+                                const std::function<void(double)>& progress) {
+  std::vector<BodyRow> rows;
+  const std::vector<BodyCase> cases = body_cases(quick);
+  const std::vector<BodyEngineKind> engines = body_engines();
+  for (const BodyCase& of : cases) {
+    for (const BodyEngineKind& engine : engines) {
+      progress(static_cast<double>(rows.size()) /
+               static_cast<double>(cases.size() * engines.size()));
+      rows.push_back(measure_bodies(of, engine, now));
+    }
+  }
+  return rows;
+}
+
+BodyTickCost body_tick_cost(bool quick, const std::function<double()>& now) {
+  std::vector<SceneObject> objects;
+  std::vector<MovingObject> moving;
+  for (int i = 0; i < 11; ++i) {
+    MovingObject object;
+    object.object = i;
+    object.body.mass = 0.1;
+    object.body.restitution = 0.8;
+    object.pose.position = {0.06 * (i % 4), 0.06 * ((i / 4) % 4), i == 10 ? 0.12 : 0.005 * i};
+    object.body.damping = 0.2;
+    for (const auto& [mesh, at] : i == 10 ? rocket() : dumbbell()) {
+      SceneObject part;
+      part.mesh = mesh;
+      part.object = i;
+      part.pose = {object.pose.position + at.position, at.orientation};
+      objects.push_back(part);
+    }
+    moving.push_back(object);
+  }
+  const Scene scene = moving_scene(objects, moving, Vec3(0));
+  RenderState state = scene.initial_state();
+  const int ticks = quick ? 2000 : 20000;
+  std::vector<double> costs;
+  for (int i = 0; i < ticks; ++i) {
+    // The hand follows one body and pushes it.
+    const BodyPose& body =
+        state.motion.bodies()[static_cast<std::size_t>(i / 400) % state.motion.bodies().size()];
+    const double phase = (i % 400) / 400.0;
+    const Vec3 tip = body.centre + Vec3(0.08 - 0.09 * phase, 0.01 * std::sin(0.01 * i), 0.01);
+    const double start = now();
+    ray_renderer().tick(scene, state, {tip, tip + Vec3(0.12, 0.02, 0.01)}, 1e-3);
+    costs.push_back(1e-3 * (now() - start));
+  }
+  std::sort(costs.begin(), costs.end());
+  BodyTickCost cost;
+  cost.ticks = costs.size();
+  cost.median = costs[costs.size() / 2];
+  cost.p99 = costs[costs.size() * 99 / 100];
+  cost.most = costs.back();
+  return cost;
+}
 
 std::vector<SoftRow> soft_study(bool quick, const std::function<double()>& now,
                                 const std::function<void(double)>& progress) {

@@ -137,6 +137,11 @@ class BruteForce final : public ContactMethod {
   const stimuli::ConvexMesh& mesh_;
 };
 
+template <class M>
+std::unique_ptr<ContactMethod> make(const stimuli::ConvexMesh& mesh, bool segment) {
+  return std::make_unique<M>(mesh, segment);
+}
+
 template <std::size_t kIndex>
 class PeerMethod final : public ContactMethod {
  public:
@@ -150,9 +155,8 @@ class PeerMethod final : public ContactMethod {
   std::unique_ptr<Peer> peer_;
 };
 
-template <class M>
-std::unique_ptr<ContactMethod> make(const stimuli::ConvexMesh& mesh, bool segment) {
-  return std::make_unique<M>(mesh, segment);
+double angle_between(const Vec3& a, const Vec3& b) {
+  return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
 }
 
 }  // namespace
@@ -182,14 +186,6 @@ std::vector<MethodDefinition> contact_methods() {
   }
   return methods;
 }
-
-namespace {
-
-double angle_between(const Vec3& a, const Vec3& b) {
-  return std::atan2(glm::length(glm::cross(a, b)), glm::dot(a, b));
-}
-
-}  // namespace
 
 ErrorSpread error_spread(std::vector<double> errors) {
   ErrorSpread s;

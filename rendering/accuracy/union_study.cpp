@@ -138,74 +138,6 @@ UnionCase cluster_case(int segments, std::uint64_t seed, std::size_t ticks) {
   return one;
 }
 
-/// A hook of three segments is lowered behind a beam, pulled up against it, rocked and lowered.
-UnionCase hook_case(std::uint64_t seed, std::size_t ticks) {
-  Random random(seed, {6});
-  const Sway x(random), z(random), turn(random);
-  // The short arm is below the beam; the long one stands beside it.
-  UnionCase one{{box_part({-0.01, -0.05, -0.01}, {0.01, 0.05, 0.01})},
-                {{Vec3(0), Vec3(0, 0, 0.08)},
-                 {Vec3(0), Vec3(-0.03, 0, 0)},
-                 {Vec3(-0.03, 0, 0), Vec3(-0.03, 0, 0.015)}},
-                {},
-                {}};
-  const auto pose = [&](std::size_t i) {
-    const double angle = 0.15 * turn(i);
-    const Vec3 up(std::sin(angle), 0, std::cos(angle)), y(0, 1, 0);
-    return OraclePose{{0.011 + 3e-3 * x(i), 0.01, -0.012 + 4e-3 * z(i)},
-                      Mat3(glm::cross(y, up), y, up)};
-  };
-  // From beyond the end of the beam.
-  OraclePose start = pose(0);
-  start.tip.y = -0.09;
-  come_down(one.path, start.tip - Vec3(0, 0, 0.01), {start.tip, start.axes});
-  come_down(one.path, start.tip, pose(0));
-  for (std::size_t i = 0; one.path.size() < ticks; ++i) one.path.push_back(pose(i));
-  by_oracle(one, one.parts);
-  return one;
-}
-
-}  // namespace
-
-std::vector<UnionCaseKind> union_case_kinds() {
-  constexpr const char* kClosed = "closed form";
-  constexpr const char* kOracle = "oracle";
-  std::vector<UnionCaseKind> kinds;
-  const auto add_groove = [&](const char* name, double degrees) {
-    kinds.push_back({name, kClosed, [degrees](std::uint64_t seed, std::size_t ticks) {
-                       return groove_case(degrees * kDegree, seed, ticks);
-                     }});
-  };
-  add_groove("groove of 2 degrees", 2);
-  add_groove("groove of 10 degrees", 10);
-  add_groove("groove of 45 degrees", 45);
-  add_groove("groove of 90 degrees", 90);
-  add_groove("groove of 150 degrees", 150);
-  add_groove("groove of 178 degrees", 178);
-  kinds.push_back({"16 boxes that abut", kClosed, [](std::uint64_t seed, std::size_t ticks) {
-                     return seam_case(0, seed, ticks);
-                   }});
-  kinds.push_back({"16 boxes that overlap", kClosed, [](std::uint64_t seed, std::size_t ticks) {
-                     return seam_case(0.004, seed, ticks);
-                   }});
-  kinds.push_back({"corner of a stair", kClosed, stair_case});
-  kinds.push_back({"solid cut in four", "oracle on the whole", cut_case});
-  const auto add_cluster = [&](const char* name, int segments) {
-    kinds.push_back({name, kOracle, [segments](std::uint64_t seed, std::size_t ticks) {
-                       return cluster_case(segments, seed, ticks);
-                     }});
-  };
-  add_cluster("cluster, one segment", 1);
-  add_cluster("cluster, two segments", 2);
-  add_cluster("cluster, three segments", 3);
-  kinds.push_back({"hook behind a beam", kOracle, hook_case});
-  return kinds;
-}
-
-namespace {
-
-constexpr double kCarrier = 0.12;  // m, length of a stylus that carries a tool
-
 /// One tick of a method.
 struct UnionEstimate {
   Vec3 force;        // N
@@ -217,6 +149,8 @@ class UnionRun {
   virtual ~UnionRun() = default;
   virtual UnionEstimate tick(const OraclePose& pose) = 0;
 };
+
+constexpr double kCarrier = 0.12;  // m, length of a stylus that carries a tool
 
 bool is_point(const OracleTool& tool) { return tool.size() == 1 && tool[0].from == tool[0].to; }
 
@@ -333,6 +267,33 @@ std::unique_ptr<UnionRun> start(std::size_t method, const UnionCase& one) {
   return std::make_unique<Penalties>(one);
 }
 
+/// A hook of three segments is lowered behind a beam, pulled up against it, rocked and lowered.
+UnionCase hook_case(std::uint64_t seed, std::size_t ticks) {
+  Random random(seed, {6});
+  const Sway x(random), z(random), turn(random);
+  // The short arm is below the beam; the long one stands beside it.
+  UnionCase one{{box_part({-0.01, -0.05, -0.01}, {0.01, 0.05, 0.01})},
+                {{Vec3(0), Vec3(0, 0, 0.08)},
+                 {Vec3(0), Vec3(-0.03, 0, 0)},
+                 {Vec3(-0.03, 0, 0), Vec3(-0.03, 0, 0.015)}},
+                {},
+                {}};
+  const auto pose = [&](std::size_t i) {
+    const double angle = 0.15 * turn(i);
+    const Vec3 up(std::sin(angle), 0, std::cos(angle)), y(0, 1, 0);
+    return OraclePose{{0.011 + 3e-3 * x(i), 0.01, -0.012 + 4e-3 * z(i)},
+                      Mat3(glm::cross(y, up), y, up)};
+  };
+  // From beyond the end of the beam.
+  OraclePose start = pose(0);
+  start.tip.y = -0.09;
+  come_down(one.path, start.tip - Vec3(0, 0, 0.01), {start.tip, start.axes});
+  come_down(one.path, start.tip, pose(0));
+  for (std::size_t i = 0; one.path.size() < ticks; ++i) one.path.push_back(pose(i));
+  by_oracle(one, one.parts);
+  return one;
+}
+
 /// One method over the cases of one kind.
 class Tally {
  public:
@@ -384,6 +345,41 @@ class Tally {
 };
 
 }  // namespace
+
+std::vector<UnionCaseKind> union_case_kinds() {
+  constexpr const char* kClosed = "closed form";
+  constexpr const char* kOracle = "oracle";
+  std::vector<UnionCaseKind> kinds;
+  const auto add_groove = [&](const char* name, double degrees) {
+    kinds.push_back({name, kClosed, [degrees](std::uint64_t seed, std::size_t ticks) {
+                       return groove_case(degrees * kDegree, seed, ticks);
+                     }});
+  };
+  add_groove("groove of 2 degrees", 2);
+  add_groove("groove of 10 degrees", 10);
+  add_groove("groove of 45 degrees", 45);
+  add_groove("groove of 90 degrees", 90);
+  add_groove("groove of 150 degrees", 150);
+  add_groove("groove of 178 degrees", 178);
+  kinds.push_back({"16 boxes that abut", kClosed, [](std::uint64_t seed, std::size_t ticks) {
+                     return seam_case(0, seed, ticks);
+                   }});
+  kinds.push_back({"16 boxes that overlap", kClosed, [](std::uint64_t seed, std::size_t ticks) {
+                     return seam_case(0.004, seed, ticks);
+                   }});
+  kinds.push_back({"corner of a stair", kClosed, stair_case});
+  kinds.push_back({"solid cut in four", "oracle on the whole", cut_case});
+  const auto add_cluster = [&](const char* name, int segments) {
+    kinds.push_back({name, kOracle, [segments](std::uint64_t seed, std::size_t ticks) {
+                       return cluster_case(segments, seed, ticks);
+                     }});
+  };
+  add_cluster("cluster, one segment", 1);
+  add_cluster("cluster, two segments", 2);
+  add_cluster("cluster, three segments", 3);
+  kinds.push_back({"hook behind a beam", kOracle, hook_case});
+  return kinds;
+}
 
 const std::vector<UnionMethod>& union_methods() {
   static const std::vector<UnionMethod> methods{

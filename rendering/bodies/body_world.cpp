@@ -6,6 +6,120 @@
 #include <numbers>
 
 namespace palpate::rendering {
+namespace {
+
+constexpr int kMostEvents = 32;  // in a step; later meetings are held apart without a bounce
+
+Vec3 velocity_after(const BodyWorld& world, const MovingBody& body, const Vec3& velocity,
+                    double duration) {
+  BodyMotion motion;
+  motion.velocity = velocity;
+  move_freely(body.inertia, world.gravity, body.of.damping, duration, motion);
+  return motion.velocity;
+}
+
+/// Moves a body by the velocity that impulses have given it.
+void move_pushed(const MovingBody& body, double duration, BodyMotion& motion) {
+  motion.centre += duration * motion.velocity;
+  motion.orientation =
+      turned_freely(body.inertia, motion.spin_momentum, motion.orientation, duration);
+}
+
+/// Applies gravity and damping to the velocities alone.
+void accelerate(const BodyWorld& world, const MovingBody& body, double duration,
+                BodyMotion& motion) {
+  motion.velocity = velocity_after(world, body, motion.velocity, duration);
+  if (body.of.damping > 0) motion.spin_momentum *= std::exp(-body.of.damping * duration);
+}
+
+void move_all(const BodyWorld& world, BodyWorldState& state, double duration) {
+  BodyContacts contacts(world, state);
+  double left = duration;
+  for (int event = 0; left > 0; ++event) {
+    contacts.find(left);
+    if (state.near.empty()) {
+      for (std::size_t i = 0; i < world.bodies.size(); ++i) {
+        if (state.sleep[i].asleep) continue;
+        move_freely(world.bodies[i].inertia, world.gravity, world.bodies[i].of.damping, left,
+                    state.motion[i]);
+      }
+      return;
+    }
+    if (contacts.bounce(left, duration)) contacts.find(left);
+    const double next = event < kMostEvents ? contacts.time_to_next(left) : left;
+    // Impulses act on the velocities at the end of the step; bodies without impulses move freely.
+    contacts.hold_apart(next, {});
+    for (std::size_t i = 0; i < world.bodies.size(); ++i) {
+      if (state.sleep[i].asleep) continue;
+      const MovingBody& body = world.bodies[i];
+      if (state.pushed[i]) {
+        accelerate(world, body, next, state.motion[i]);
+        contacts.add_impulses(i);
+        move_pushed(body, next, state.motion[i]);
+      } else {
+        move_freely(body.inertia, world.gravity, body.of.damping, next, state.motion[i]);
+      }
+    }
+    left -= next;
+    if (left < 1e-12 * duration) break;
+  }
+}
+
+constexpr double kRestBefore = 0.5;  // s
+constexpr double kNowhere = 1e-6;    // m, of any point of the body in that time
+constexpr double kInTouch = 1e-6;    // m
+
+bool has_stopped(const BodyWorld& world, const MovingBody& body, const BodyMotion& motion,
+                 const SleepState& sleep) {
+  const Quat turn = motion.orientation * glm::conjugate(sleep.orientation);
+  const double moved = glm::distance(motion.centre, sleep.centre) +
+                       2 * body.radius * glm::length(Vec3(turn.x, turn.y, turn.z));
+  if (!(moved <= kNowhere)) return false;
+  return world.gravity != Vec3(0) || body.of.damping > 0 ||
+         (motion.velocity == Vec3(0) && motion.spin_momentum == Vec3(0));
+}
+
+/// Sets state.island from the contacts.
+void join_touching(const BodyWorld& world, BodyWorldState& state) {
+  for (std::uint32_t i = 0; i < state.island.size(); ++i) state.island[i] = i;
+  for (bool more = true; more;) {
+    more = false;
+    for (const auto& parts : state.near_parts) {
+      const BodyPair& pair = world.pairs[parts.pair];
+      if (pair.obstacle || parts.gap > kInTouch) continue;
+      std::uint32_t &a = state.island[pair.a], &b = state.island[pair.b];
+      if (a == b) continue;
+      a = b = std::min(a, b);
+      more = true;
+    }
+  }
+}
+
+constexpr double kUnbounded = 1e300;
+
+/// m/s; the least speed of separation at a contact: it may close its gap, and overlapping parts
+/// separate slowly.
+double least_speed_of(double gap, double step) {
+  constexpr double kShare = 0.2, kFastest = 0.05;
+  return gap >= 0 ? -gap / step : std::min(kShare * -gap / step, kFastest);
+}
+
+// m; the gap that the search aims at; any up to kMet is accepted.
+constexpr double kSought = 0.5 * BodyContacts::kTouching;
+
+/// s, until a freely growing depth reaches 0 from below; infinite if it does not.
+double time_to_entry(double depth, double speed, double growth) {
+  if (depth >= 0 && (speed > 0 || (speed == 0 && growth > 0) || depth > 0)) return 0;
+  // depth + speed t + growth t^2 / 2 = 0, the first root after 0.
+  const double under = speed * speed - 2 * growth * depth;
+  if (under < 0) return HUGE_VAL;
+  const double root = std::sqrt(under);
+  if (speed > 0) return depth < 0 ? -2 * depth / (speed + root) : HUGE_VAL;
+  if (growth > 0) return (root - speed) / growth;
+  return HUGE_VAL;
+}
+
+}  // namespace
 
 void BodyWorld::pair_up() {
   pairs.clear();
@@ -110,67 +224,6 @@ Vec3 angular_momentum(const BodyWorld& world, const BodyWorldState& state) {
   return sum;
 }
 
-namespace {
-
-constexpr int kMostEvents = 32;  // in a step; later meetings are held apart without a bounce
-
-Vec3 velocity_after(const BodyWorld& world, const MovingBody& body, const Vec3& velocity,
-                    double duration) {
-  BodyMotion motion;
-  motion.velocity = velocity;
-  move_freely(body.inertia, world.gravity, body.of.damping, duration, motion);
-  return motion.velocity;
-}
-
-/// Moves a body by the velocity that impulses have given it.
-void move_pushed(const MovingBody& body, double duration, BodyMotion& motion) {
-  motion.centre += duration * motion.velocity;
-  motion.orientation =
-      turned_freely(body.inertia, motion.spin_momentum, motion.orientation, duration);
-}
-
-/// Applies gravity and damping to the velocities alone.
-void accelerate(const BodyWorld& world, const MovingBody& body, double duration,
-                BodyMotion& motion) {
-  motion.velocity = velocity_after(world, body, motion.velocity, duration);
-  if (body.of.damping > 0) motion.spin_momentum *= std::exp(-body.of.damping * duration);
-}
-
-void move_all(const BodyWorld& world, BodyWorldState& state, double duration) {
-  BodyContacts contacts(world, state);
-  double left = duration;
-  for (int event = 0; left > 0; ++event) {
-    contacts.find(left);
-    if (state.near.empty()) {
-      for (std::size_t i = 0; i < world.bodies.size(); ++i) {
-        if (state.sleep[i].asleep) continue;
-        move_freely(world.bodies[i].inertia, world.gravity, world.bodies[i].of.damping, left,
-                    state.motion[i]);
-      }
-      return;
-    }
-    if (contacts.bounce(left, duration)) contacts.find(left);
-    const double next = event < kMostEvents ? contacts.time_to_next(left) : left;
-    // Impulses act on the velocities at the end of the step; bodies without impulses move freely.
-    contacts.hold_apart(next, {});
-    for (std::size_t i = 0; i < world.bodies.size(); ++i) {
-      if (state.sleep[i].asleep) continue;
-      const MovingBody& body = world.bodies[i];
-      if (state.pushed[i]) {
-        accelerate(world, body, next, state.motion[i]);
-        contacts.add_impulses(i);
-        move_pushed(body, next, state.motion[i]);
-      } else {
-        move_freely(body.inertia, world.gravity, body.of.damping, next, state.motion[i]);
-      }
-    }
-    left -= next;
-    if (left < 1e-12 * duration) break;
-  }
-}
-
-}  // namespace
-
 void step_bodies(const BodyWorld& world, BodyWorldState& state, double duration) {
   if (state.sleeping == world.bodies.size()) return;
   move_all(world, state, duration);
@@ -215,40 +268,6 @@ bool touches_nothing(const BodyWorld& world, BodyWorldState& state, std::uint32_
                      double duration, double distance) {
   return !BodyContacts(world, state).may_touch(body, duration, distance);
 }
-
-namespace {
-
-constexpr double kRestBefore = 0.5;  // s
-constexpr double kNowhere = 1e-6;    // m, of any point of the body in that time
-constexpr double kInTouch = 1e-6;    // m
-
-bool has_stopped(const BodyWorld& world, const MovingBody& body, const BodyMotion& motion,
-                 const SleepState& sleep) {
-  const Quat turn = motion.orientation * glm::conjugate(sleep.orientation);
-  const double moved = glm::distance(motion.centre, sleep.centre) +
-                       2 * body.radius * glm::length(Vec3(turn.x, turn.y, turn.z));
-  if (!(moved <= kNowhere)) return false;
-  return world.gravity != Vec3(0) || body.of.damping > 0 ||
-         (motion.velocity == Vec3(0) && motion.spin_momentum == Vec3(0));
-}
-
-/// Sets state.island from the contacts.
-void join_touching(const BodyWorld& world, BodyWorldState& state) {
-  for (std::uint32_t i = 0; i < state.island.size(); ++i) state.island[i] = i;
-  for (bool more = true; more;) {
-    more = false;
-    for (const auto& parts : state.near_parts) {
-      const BodyPair& pair = world.pairs[parts.pair];
-      if (pair.obstacle || parts.gap > kInTouch) continue;
-      std::uint32_t &a = state.island[pair.a], &b = state.island[pair.b];
-      if (a == b) continue;
-      a = b = std::min(a, b);
-      more = true;
-    }
-  }
-}
-
-}  // namespace
 
 void fall_asleep(const BodyWorld& world, BodyWorldState& state, double duration) {
   if (!world.sleeps) return;
@@ -297,19 +316,6 @@ void wake(BodyWorldState& state, std::uint32_t body) {
 }
 
 // The impulses in contacts.
-
-namespace {
-
-constexpr double kUnbounded = 1e300;
-
-/// m/s; the least speed of separation at a contact: it may close its gap, and overlapping parts
-/// separate slowly.
-double least_speed_of(double gap, double step) {
-  constexpr double kShare = 0.2, kFastest = 0.05;
-  return gap >= 0 ? -gap / step : std::min(kShare * -gap / step, kFastest);
-}
-
-}  // namespace
 
 void BodyContacts::begin_rows() {
   state_.rows.clear();
@@ -552,13 +558,6 @@ void BodyContacts::hold_apart(double step, std::span<PressingSpring> springs) {
 
 // When bodies meet.
 
-namespace {
-
-// m; the gap that the search aims at; any up to kMet is accepted.
-constexpr double kSought = 0.5 * BodyContacts::kTouching;
-
-}  // namespace
-
 double BodyContacts::time_to_next(double most) {
   const double resting = resting_speed(most);
   double next = most;
@@ -672,22 +671,6 @@ double BodyContacts::meeting_between(const BodyWorldState::NearParts& near, Time
   }
   return low.time;
 }
-
-namespace {
-
-/// s, until a freely growing depth reaches 0 from below; infinite if it does not.
-double time_to_entry(double depth, double speed, double growth) {
-  if (depth >= 0 && (speed > 0 || (speed == 0 && growth > 0) || depth > 0)) return 0;
-  // depth + speed t + growth t^2 / 2 = 0, the first root after 0.
-  const double under = speed * speed - 2 * growth * depth;
-  if (under < 0) return HUGE_VAL;
-  const double root = std::sqrt(under);
-  if (speed > 0) return depth < 0 ? -2 * depth / (speed + root) : HUGE_VAL;
-  if (growth > 0) return (root - speed) / growth;
-  return HUGE_VAL;
-}
-
-}  // namespace
 
 SpringPass pass_spring(const SpringStart& start, double duration) {
   constexpr int kMostEvents = 64;
@@ -944,4 +927,5 @@ void BodyContacts::find_islands() {
 double BodyContacts::resting_speed(double step) const {
   return 2 * glm::length(world_.gravity) * step + 1e-9;
 }
+
 }  // namespace palpate::rendering

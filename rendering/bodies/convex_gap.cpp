@@ -12,6 +12,7 @@
 #include "stimuli/vec.h"
 
 namespace palpate::rendering {
+namespace {
 
 // The point of a simplex nearest to the origin, for GJK. Internal to convex_gap.cpp.
 
@@ -32,11 +33,6 @@ struct GapSimplex {
     return sum;
   }
 };
-
-/// Keeps the corners that hold the nearest point, with their weights. False: the origin is inside.
-bool reduce_to_nearest(GapSimplex& simplex);
-
-namespace {
 
 void keep(GapSimplex& simplex, std::initializer_list<std::size_t> which,
           std::initializer_list<double> weights) {
@@ -104,8 +100,7 @@ bool nearest_of_tetrahedron(GapSimplex& s) {
   return true;
 }
 
-}  // namespace
-
+/// Keeps the corners that hold the nearest point, with their weights. False: the origin is inside.
 bool reduce_to_nearest(GapSimplex& simplex) {
   switch (simplex.count) {
     case 1:
@@ -121,8 +116,6 @@ bool reduce_to_nearest(GapSimplex& simplex) {
       return nearest_of_tetrahedron(simplex);
   }
 }
-
-namespace {
 
 /// The slab of two parts along a direction, m, with the corners that bound it.
 struct Slab {

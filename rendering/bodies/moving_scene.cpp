@@ -26,6 +26,162 @@ bool is_finite(const BodyMotion& motion) {
   return std::isfinite(sum.x + sum.y + sum.z + q.w + q.x + q.y + q.z) && in_range(motion.centre);
 }
 
+constexpr double kFarthest = 5e-4;  // m, in a step against the probe
+constexpr int kMostSteps = 20;
+
+Pose inverse(const Pose& pose) {
+  const Quat back = glm::conjugate(pose.orientation);
+  return {-(back * pose.position), back};
+}
+
+[[noreturn]] void refuse(int object, const std::string& why) {
+  throw std::invalid_argument("/objects/" + std::to_string(object) + "/body: " + why);
+}
+
+CollidingPart colliding(const SceneObject& part, const Pose& in_frame) {
+  CollidingPart out;
+  out.mesh = part.mesh;
+  out.pose = in_frame;
+  for (const Vec3& vertex : part.mesh->vertices())
+    out.inside += vertex / static_cast<double>(part.mesh->vertices().size());
+  out.centre = in_frame.orientation * part.mesh->centre() + in_frame.position;
+  return out;
+}
+
+/// The parts of one object in a scene, at their first places.
+struct OwnParts {
+  std::vector<SceneObject> felt;
+  std::vector<SceneSurface> surfaces;
+  std::vector<SceneObject> solid;  ///< its colliding parts
+};
+
+MovingBody make_body(const MovingObject& moving, const OwnParts& own) {
+  MovingBody body;
+  body.object = moving.object;
+  body.of = moving.body;
+  std::vector<PlacedMesh> solids;
+  const Pose to_object = inverse(moving.pose);
+  for (const SceneObject& part : own.felt)
+    body.stiffness = std::max(body.stiffness, part.material.stiffness);
+  for (const SceneSurface& surface : own.surfaces) {
+    for (const stimuli::Material& material : surface.surface->materials())
+      body.stiffness = std::max(body.stiffness, material.stiffness);
+  }
+  for (const SceneObject& part : own.solid)
+    solids.push_back({part.mesh.get(), stimuli::compose(to_object, part.pose)});
+  if (solids.empty() && own.surfaces.empty())
+    refuse(moving.object, "expected an object with a surface");
+  const VolumeMoments moments =
+      moving.solid != nullptr ? moments_of_surface(*moving.solid, Pose{})
+      : own.surfaces.empty()
+          ? moments_of_union(solids)
+          : moments_of_surface(*own.surfaces.front().surface,
+                               stimuli::compose(to_object, own.surfaces.front().pose));
+  const MassProperties properties = moving.body.mass ? with_mass(moments, *moving.body.mass)
+                                                     : with_density(moments, *moving.body.density);
+  try {
+    body.inertia = inertia_of(properties);
+  } catch (const std::invalid_argument& error) {
+    refuse(moving.object, error.what());
+  }
+  body.placed = {moving.pose.orientation * properties.centre + moving.pose.position,
+                 moving.pose.orientation};
+  body.start.centre = body.placed.position;
+  body.start.orientation = body.placed.orientation;
+  body.start.velocity = moving.body.velocity;
+  body.start.spin_momentum =
+      spin_momentum_of(body.inertia, body.start.orientation, moving.body.spin);
+  const Pose to_body = inverse(body.placed);
+  for (const SceneObject& part : own.solid) {
+    body.parts.push_back(colliding(part, stimuli::compose(to_body, part.pose)));
+    const CollidingPart& placed = body.parts.back();
+    for (const Vec3& vertex : part.mesh->vertices())
+      body.radius = std::max(body.radius,
+                             glm::length(placed.pose.orientation * vertex + placed.pose.position));
+  }
+  for (const SceneSurface& surface : own.surfaces) {
+    const Pose placed = stimuli::compose(to_body, surface.pose);
+    for (const Vec3& vertex : surface.surface->vertices())
+      body.radius =
+          std::max(body.radius, glm::length(placed.orientation * vertex + placed.position));
+  }
+  return body;
+}
+
+Obstacle make_obstacle(const std::vector<SceneObject>& parts) {
+  Obstacle obstacle;
+  obstacle.object = parts.front().object;
+  for (const SceneObject& part : parts) {
+    obstacle.parts.push_back(colliding(part, part.pose));
+    obstacle.centre += obstacle.parts.back().centre;
+  }
+  obstacle.centre /= static_cast<double>(std::max<std::size_t>(1, obstacle.parts.size()));
+  for (const CollidingPart& part : obstacle.parts)
+    obstacle.radius =
+        std::max(obstacle.radius, glm::length(part.centre - obstacle.centre) + part.mesh->radius());
+  return obstacle;
+}
+
+/// Limits that a step of a millisecond can follow.
+void check_limits(const MovingBody& body) {
+  constexpr double kFastest = 100, kFastestTurn = 1000;  // m/s, rad/s
+  constexpr double kLeastTurn = 1e-6;                    // of the largest moment of inertia
+  std::ostringstream text;
+  const Vec3 spin = spin_of(body.inertia, body.start);
+  if (glm::length(body.start.velocity) > kFastest)
+    text << "velocity " << glm::length(body.start.velocity) << " m/s; expected at most "
+         << kFastest;
+  else if (glm::length(spin) > kFastestTurn)
+    text << "spin " << glm::length(spin) << " rad/s; expected at most " << kFastestTurn;
+  else if (body.inertia.mass < 1e-6)
+    text << "mass " << body.inertia.mass << " kg; expected at least 1e-6 kg";
+  const Mat3& inertia = body.inertia.inertia;
+  const double largest = std::max({inertia[0][0], inertia[1][1], inertia[2][2]});
+  const double least = std::min({inertia[0][0], inertia[1][1], inertia[2][2]});
+  if (text.str().empty() && least < kLeastTurn * largest)
+    text << "moments of inertia of a ratio of " << largest / least << "; expected at most 1e6";
+  if (!text.str().empty()) refuse(body.object, text.str());
+}
+
+void check_masses(const BodyWorld& world) {
+  constexpr double kMostRatio = 1e6;
+  const MovingBody *lightest = nullptr, *heaviest = nullptr;
+  for (const MovingBody& body : world.bodies) {
+    if (lightest == nullptr || body.inertia.mass < lightest->inertia.mass) lightest = &body;
+    if (heaviest == nullptr || body.inertia.mass > heaviest->inertia.mass) heaviest = &body;
+  }
+  if (lightest == nullptr || heaviest->inertia.mass <= kMostRatio * lightest->inertia.mass) return;
+  std::ostringstream text;
+  text << "a mass of " << lightest->inertia.mass << " kg beside one of " << heaviest->inertia.mass
+       << " kg (object " << heaviest->object << "); expected a ratio of at most 1e6";
+  refuse(lightest->object, text.str());
+}
+
+/// Bodies that overlap at the start would fly apart.
+void check_overlaps(const BodyWorld& world) {
+  constexpr double kMostOverlap = 1e-4;  // m; less comes apart slowly
+  for (const BodyPair& pair : world.pairs) {
+    const MovingBody& a = world.bodies[pair.a];
+    const std::vector<CollidingPart>& parts =
+        pair.obstacle ? world.obstacles[pair.b].parts : world.bodies[pair.b].parts;
+    const Pose frame = pair.obstacle ? Pose{} : world.bodies[pair.b].placed;
+    double overlap = 0;
+    for (std::uint32_t k = pair.first; k < pair.first + pair.count; ++k) {
+      GapMemory memory;
+      const PartPair& both = world.part_pairs[k];
+      const ConvexPlace at_a = place_of(a.parts[both.part_a], a.placed);
+      const ConvexPlace at_b = place_of(parts[both.part_b], frame);
+      overlap = std::max(overlap, -gap_between(at_a, at_b, 0, memory).distance);
+    }
+    if (overlap <= kMostOverlap) continue;
+    std::ostringstream text;
+    text << "is " << 1e3 * overlap << " mm inside of object "
+         << (pair.obstacle ? world.obstacles[pair.b].object : world.bodies[pair.b].object)
+         << " at the start; expected at most " << 1e3 * kMostOverlap << " mm";
+    refuse(a.object, text.str());
+  }
+}
+
 }  // namespace
 
 std::unique_ptr<MotionState> BodiesState::clone() const {
@@ -349,13 +505,6 @@ void MovingBodies::settle_shape(BodiesState& state, std::size_t body, const Stro
 
 // A body that moves fast against the probe and touches nothing else makes steps of its own within a
 // step.
-
-namespace {
-
-constexpr double kFarthest = 5e-4;  // m, in a step against the probe
-constexpr int kMostSteps = 20;
-
-}  // namespace
 
 /// Number of steps that a body makes within a step, so that in each none of its points moves so far
 /// against the probe that levers and normals change. 1 if the probe is far or slow, or if the body
@@ -779,163 +928,6 @@ Rendering MovingBodies::sum(const Renderer& renderer, const BodiesState& state,
   none.faults = out.faults | render_fault::kNonFinite;
   return none;
 }
-
-namespace {
-
-Pose inverse(const Pose& pose) {
-  const Quat back = glm::conjugate(pose.orientation);
-  return {-(back * pose.position), back};
-}
-
-[[noreturn]] void refuse(int object, const std::string& why) {
-  throw std::invalid_argument("/objects/" + std::to_string(object) + "/body: " + why);
-}
-
-CollidingPart colliding(const SceneObject& part, const Pose& in_frame) {
-  CollidingPart out;
-  out.mesh = part.mesh;
-  out.pose = in_frame;
-  for (const Vec3& vertex : part.mesh->vertices())
-    out.inside += vertex / static_cast<double>(part.mesh->vertices().size());
-  out.centre = in_frame.orientation * part.mesh->centre() + in_frame.position;
-  return out;
-}
-
-/// The parts of one object in a scene, at their first places.
-struct OwnParts {
-  std::vector<SceneObject> felt;
-  std::vector<SceneSurface> surfaces;
-  std::vector<SceneObject> solid;  ///< its colliding parts
-};
-
-MovingBody make_body(const MovingObject& moving, const OwnParts& own) {
-  MovingBody body;
-  body.object = moving.object;
-  body.of = moving.body;
-  std::vector<PlacedMesh> solids;
-  const Pose to_object = inverse(moving.pose);
-  for (const SceneObject& part : own.felt)
-    body.stiffness = std::max(body.stiffness, part.material.stiffness);
-  for (const SceneSurface& surface : own.surfaces) {
-    for (const stimuli::Material& material : surface.surface->materials())
-      body.stiffness = std::max(body.stiffness, material.stiffness);
-  }
-  for (const SceneObject& part : own.solid)
-    solids.push_back({part.mesh.get(), stimuli::compose(to_object, part.pose)});
-  if (solids.empty() && own.surfaces.empty())
-    refuse(moving.object, "expected an object with a surface");
-  const VolumeMoments moments =
-      moving.solid != nullptr ? moments_of_surface(*moving.solid, Pose{})
-      : own.surfaces.empty()
-          ? moments_of_union(solids)
-          : moments_of_surface(*own.surfaces.front().surface,
-                               stimuli::compose(to_object, own.surfaces.front().pose));
-  const MassProperties properties = moving.body.mass ? with_mass(moments, *moving.body.mass)
-                                                     : with_density(moments, *moving.body.density);
-  try {
-    body.inertia = inertia_of(properties);
-  } catch (const std::invalid_argument& error) {
-    refuse(moving.object, error.what());
-  }
-  body.placed = {moving.pose.orientation * properties.centre + moving.pose.position,
-                 moving.pose.orientation};
-  body.start.centre = body.placed.position;
-  body.start.orientation = body.placed.orientation;
-  body.start.velocity = moving.body.velocity;
-  body.start.spin_momentum =
-      spin_momentum_of(body.inertia, body.start.orientation, moving.body.spin);
-  const Pose to_body = inverse(body.placed);
-  for (const SceneObject& part : own.solid) {
-    body.parts.push_back(colliding(part, stimuli::compose(to_body, part.pose)));
-    const CollidingPart& placed = body.parts.back();
-    for (const Vec3& vertex : part.mesh->vertices())
-      body.radius = std::max(body.radius,
-                             glm::length(placed.pose.orientation * vertex + placed.pose.position));
-  }
-  for (const SceneSurface& surface : own.surfaces) {
-    const Pose placed = stimuli::compose(to_body, surface.pose);
-    for (const Vec3& vertex : surface.surface->vertices())
-      body.radius =
-          std::max(body.radius, glm::length(placed.orientation * vertex + placed.position));
-  }
-  return body;
-}
-
-Obstacle make_obstacle(const std::vector<SceneObject>& parts) {
-  Obstacle obstacle;
-  obstacle.object = parts.front().object;
-  for (const SceneObject& part : parts) {
-    obstacle.parts.push_back(colliding(part, part.pose));
-    obstacle.centre += obstacle.parts.back().centre;
-  }
-  obstacle.centre /= static_cast<double>(std::max<std::size_t>(1, obstacle.parts.size()));
-  for (const CollidingPart& part : obstacle.parts)
-    obstacle.radius =
-        std::max(obstacle.radius, glm::length(part.centre - obstacle.centre) + part.mesh->radius());
-  return obstacle;
-}
-
-/// Limits that a step of a millisecond can follow.
-void check_limits(const MovingBody& body) {
-  constexpr double kFastest = 100, kFastestTurn = 1000;  // m/s, rad/s
-  constexpr double kLeastTurn = 1e-6;                    // of the largest moment of inertia
-  std::ostringstream text;
-  const Vec3 spin = spin_of(body.inertia, body.start);
-  if (glm::length(body.start.velocity) > kFastest)
-    text << "velocity " << glm::length(body.start.velocity) << " m/s; expected at most "
-         << kFastest;
-  else if (glm::length(spin) > kFastestTurn)
-    text << "spin " << glm::length(spin) << " rad/s; expected at most " << kFastestTurn;
-  else if (body.inertia.mass < 1e-6)
-    text << "mass " << body.inertia.mass << " kg; expected at least 1e-6 kg";
-  const Mat3& inertia = body.inertia.inertia;
-  const double largest = std::max({inertia[0][0], inertia[1][1], inertia[2][2]});
-  const double least = std::min({inertia[0][0], inertia[1][1], inertia[2][2]});
-  if (text.str().empty() && least < kLeastTurn * largest)
-    text << "moments of inertia of a ratio of " << largest / least << "; expected at most 1e6";
-  if (!text.str().empty()) refuse(body.object, text.str());
-}
-
-void check_masses(const BodyWorld& world) {
-  constexpr double kMostRatio = 1e6;
-  const MovingBody *lightest = nullptr, *heaviest = nullptr;
-  for (const MovingBody& body : world.bodies) {
-    if (lightest == nullptr || body.inertia.mass < lightest->inertia.mass) lightest = &body;
-    if (heaviest == nullptr || body.inertia.mass > heaviest->inertia.mass) heaviest = &body;
-  }
-  if (lightest == nullptr || heaviest->inertia.mass <= kMostRatio * lightest->inertia.mass) return;
-  std::ostringstream text;
-  text << "a mass of " << lightest->inertia.mass << " kg beside one of " << heaviest->inertia.mass
-       << " kg (object " << heaviest->object << "); expected a ratio of at most 1e6";
-  refuse(lightest->object, text.str());
-}
-
-/// Bodies that overlap at the start would fly apart.
-void check_overlaps(const BodyWorld& world) {
-  constexpr double kMostOverlap = 1e-4;  // m; less comes apart slowly
-  for (const BodyPair& pair : world.pairs) {
-    const MovingBody& a = world.bodies[pair.a];
-    const std::vector<CollidingPart>& parts =
-        pair.obstacle ? world.obstacles[pair.b].parts : world.bodies[pair.b].parts;
-    const Pose frame = pair.obstacle ? Pose{} : world.bodies[pair.b].placed;
-    double overlap = 0;
-    for (std::uint32_t k = pair.first; k < pair.first + pair.count; ++k) {
-      GapMemory memory;
-      const PartPair& both = world.part_pairs[k];
-      const ConvexPlace at_a = place_of(a.parts[both.part_a], a.placed);
-      const ConvexPlace at_b = place_of(parts[both.part_b], frame);
-      overlap = std::max(overlap, -gap_between(at_a, at_b, 0, memory).distance);
-    }
-    if (overlap <= kMostOverlap) continue;
-    std::ostringstream text;
-    text << "is " << 1e3 * overlap << " mm inside of object "
-         << (pair.obstacle ? world.obstacles[pair.b].object : world.bodies[pair.b].object)
-         << " at the start; expected at most " << 1e3 * kMostOverlap << " mm";
-    refuse(a.object, text.str());
-  }
-}
-
-}  // namespace
 
 std::optional<MovingSummary> moving_summary(const Scene& scene) {
   const auto* const moving = dynamic_cast<const MovingBodies*>(scene.motion());

@@ -219,28 +219,6 @@ void add_grown_union(const std::vector<PlacedPart>& parts, VolumeMoments& out) {
   }
 }
 
-}  // namespace
-
-VolumeMoments moments_of_union(std::span<const PlacedMesh> parts) {
-  std::vector<PlacedPart> placed;
-  placed.reserve(parts.size());
-  Vec3 middle(0);
-  for (const PlacedMesh& part : parts)
-    middle += (part.pose.orientation * part.mesh->centre() + part.pose.position) /
-              static_cast<double>(parts.size());
-  for (const PlacedMesh& part : parts) {
-    PlacedMesh about = part;
-    about.pose.position -= middle;
-    placed.push_back(placed_part(about));
-  }
-  VolumeMoments moments;
-  if (!add_union(placed, kClosed, moments)) add_grown_union(placed, moments);
-  moments.about = middle;
-  return moments;
-}
-
-namespace {
-
 /// Whether some region just below one of up to 4,096 triangles is covered twice.
 bool covers_twice(const Surface& surface) {
   constexpr std::size_t kAsked = 4096;
@@ -352,25 +330,6 @@ VolumeMoments own_moments(const Surface& surface) {
   return moments;
 }
 
-}  // namespace
-
-VolumeMoments moments_of_surface(const Surface& surface, const Pose& pose) {
-  const VolumeMoments own = own_moments(surface);
-  const Mat3 turn = glm::mat3_cast(pose.orientation);
-  return {turn * own.about + pose.position, own.volume, turn * own.first,
-          turn * own.second * glm::transpose(turn)};
-}
-
-MassProperties with_density(const VolumeMoments& moments, double density) {
-  return scaled(moments, density);
-}
-
-MassProperties with_mass(const VolumeMoments& moments, double mass) {
-  return scaled(moments, mass / moments.volume);
-}
-
-namespace {
-
 /// Rate of an orientation for the spin of the momentum, times the quaternion's length: stages of
 /// Runge-Kutta do not have unit length.
 Quat rate_of_turn(const BodyInertia& inertia, const Vec3& spin_momentum, const Quat& q) {
@@ -440,6 +399,39 @@ void find_symmetry(BodyInertia& out) {
 }
 
 }  // namespace
+
+VolumeMoments moments_of_union(std::span<const PlacedMesh> parts) {
+  std::vector<PlacedPart> placed;
+  placed.reserve(parts.size());
+  Vec3 middle(0);
+  for (const PlacedMesh& part : parts)
+    middle += (part.pose.orientation * part.mesh->centre() + part.pose.position) /
+              static_cast<double>(parts.size());
+  for (const PlacedMesh& part : parts) {
+    PlacedMesh about = part;
+    about.pose.position -= middle;
+    placed.push_back(placed_part(about));
+  }
+  VolumeMoments moments;
+  if (!add_union(placed, kClosed, moments)) add_grown_union(placed, moments);
+  moments.about = middle;
+  return moments;
+}
+
+VolumeMoments moments_of_surface(const Surface& surface, const Pose& pose) {
+  const VolumeMoments own = own_moments(surface);
+  const Mat3 turn = glm::mat3_cast(pose.orientation);
+  return {turn * own.about + pose.position, own.volume, turn * own.first,
+          turn * own.second * glm::transpose(turn)};
+}
+
+MassProperties with_density(const VolumeMoments& moments, double density) {
+  return scaled(moments, density);
+}
+
+MassProperties with_mass(const VolumeMoments& moments, double mass) {
+  return scaled(moments, mass / moments.volume);
+}
 
 BodyInertia inertia_of(const MassProperties& properties) {
   const double size =

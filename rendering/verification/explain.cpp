@@ -94,6 +94,14 @@ Recording record(const Scene& scene, const Renderer& renderer, double lifted) {
 
 double sum(const Vec3& v) { return v.x + v.y + v.z; }
 
+void add_materials(const TickFeatures& features, std::vector<TickStage>& stages) {
+  const auto add = [&](const char* name, bool runs, const char* what) {
+    stages.push_back({name, StageTime::contact, runs, runs ? what : "no material has it"});
+  };
+  add("damping", features.damping, "against the normal speed, never pulling");
+  add("friction", features.friction, "Coulomb's, by the ideal probe's tangential offset");
+}
+
 /// The stages of one renderer over recordings: sliding, lifting off, hovering.
 template <class Probe>
 class StageTimings {
@@ -242,16 +250,6 @@ class StageTimings {
   std::vector<StageTiming> timings_;
 };
 
-}  // namespace
-
-std::vector<StageTiming> stage_timings(const Scene& scene, const Renderer& renderer) {
-  if (scene.parts().empty()) return {};
-  if (renderer.side_contact()) return StageTimings<tick::SegmentProbe>(scene, renderer).all();
-  return StageTimings<tick::PointProbe>(scene, renderer).all();
-}
-
-namespace {
-
 std::string counted(std::size_t count, const std::string& one, const std::string& many) {
   return std::to_string(count) + ' ' + (count == 1 ? one : many);
 }
@@ -344,15 +342,13 @@ void add_parts(const Scene& scene, std::vector<TickStage>& stages) {
                                    " while the first is touched"});
 }
 
-void add_materials(const TickFeatures& features, std::vector<TickStage>& stages) {
-  const auto add = [&](const char* name, bool runs, const char* what) {
-    stages.push_back({name, StageTime::contact, runs, runs ? what : "no material has it"});
-  };
-  add("damping", features.damping, "against the normal speed, never pulling");
-  add("friction", features.friction, "Coulomb's, by the ideal probe's tangential offset");
-}
-
 }  // namespace
+
+std::vector<StageTiming> stage_timings(const Scene& scene, const Renderer& renderer) {
+  if (scene.parts().empty()) return {};
+  if (renderer.side_contact()) return StageTimings<tick::SegmentProbe>(scene, renderer).all();
+  return StageTimings<tick::PointProbe>(scene, renderer).all();
+}
 
 const char* to_string(StageTime time) {
   switch (time) {

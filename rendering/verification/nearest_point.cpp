@@ -8,6 +8,80 @@
 #include <limits>
 
 namespace palpate::rendering {
+namespace {
+
+// Planes whose normals span less than this (squared sine, or the squared volume of three) have no
+// intersection that is stable under rounding.
+constexpr double kDependent = 1e-13;
+
+/// The multipliers that move `from` onto all chosen planes.
+bool on_planes(const Vec3& from, std::span<const HalfSpace> planes,
+               std::span<const std::size_t> chosen, std::array<double, 3>& multipliers) {
+  // A plane that is not chosen is replaced by an equation of its own: multiplier = 0.
+  Mat3 products(1);
+  Vec3 gaps(0);
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    const HalfSpace& a = planes[chosen[i]];
+    for (std::size_t k = 0; k < chosen.size(); ++k) {
+      products[static_cast<int>(k)][static_cast<int>(i)] =
+          glm::dot(a.normal, planes[chosen[k]].normal);
+    }
+    gaps[static_cast<int>(i)] = a.offset - glm::dot(a.normal, from);
+  }
+  if (chosen.size() > 1 && glm::determinant(products) < kDependent) return false;
+  const Vec3 solved = glm::inverse(products) * gaps;
+  for (std::size_t i = 0; i < chosen.size(); ++i) multipliers[i] = solved[static_cast<int>(i)];
+  return true;
+}
+
+/// A Newton step of the same system removes rounding errors.
+Vec3 displaced(const Vec3& from, std::span<const HalfSpace> planes,
+               std::span<const std::size_t> chosen, std::array<double, 3>& multipliers) {
+  Vec3 at = from;
+  for (std::size_t i = 0; i < chosen.size(); ++i) at += multipliers[i] * planes[chosen[i]].normal;
+  std::array<double, 3> more{};
+  on_planes(at, planes, chosen, more);
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    at += more[i] * planes[chosen[i]].normal;
+    multipliers[i] += more[i];
+  }
+  return at;
+}
+
+bool above_all(const Vec3& point, std::span<const HalfSpace> planes, double tolerance) {
+  return std::all_of(planes.begin(), planes.end(), [&](const HalfSpace& plane) {
+    return glm::dot(plane.normal, point) - plane.offset >= -tolerance;
+  });
+}
+
+/// Normals that span a line, a plane or the space. A vector's multiple of each normal is its
+/// product with `up`.
+struct Generators {
+  std::array<Vec3, 3> normals, up;
+  std::size_t count = 0;
+
+  /// m, the residual of the vector after its non-negative multiples; infinity if a multiple is
+  /// negative, or so large that the residual is rounding.
+  double rest(const Vec3& vector, double most_multiple) const {
+    Vec3 left = vector;
+    std::array<double, 3> multiples{};
+    for (int step = 0; step < 2; ++step) {  // the second removes the rounding of the first
+      const Vec3 before = left;
+      for (std::size_t i = 0; i < count; ++i) {
+        const double more = glm::dot(up[i], before);
+        multiples[i] += more;
+        left -= more * normals[i];
+      }
+    }
+    for (std::size_t i = 0; i < count; ++i) {
+      if (!(multiples[i] >= 0 && multiples[i] <= most_multiple * glm::length(vector)))
+        return std::numeric_limits<double>::infinity();
+    }
+    return glm::length(left);
+  }
+};
+
+}  // namespace
 
 bool separated_by_facet_plane(const stimuli::ConvexMesh& mesh, const LineProbe& before,
                               const LineProbe& after) {
@@ -55,54 +129,6 @@ std::optional<EntryFeature> entry_feature(const stimuli::ConvexMesh& mesh, const
   return best;
 }
 
-namespace {
-
-// Planes whose normals span less than this (squared sine, or the squared volume of three) have no
-// intersection that is stable under rounding.
-constexpr double kDependent = 1e-13;
-
-/// The multipliers that move `from` onto all chosen planes.
-bool on_planes(const Vec3& from, std::span<const HalfSpace> planes,
-               std::span<const std::size_t> chosen, std::array<double, 3>& multipliers) {
-  // A plane that is not chosen is replaced by an equation of its own: multiplier = 0.
-  Mat3 products(1);
-  Vec3 gaps(0);
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    const HalfSpace& a = planes[chosen[i]];
-    for (std::size_t k = 0; k < chosen.size(); ++k) {
-      products[static_cast<int>(k)][static_cast<int>(i)] =
-          glm::dot(a.normal, planes[chosen[k]].normal);
-    }
-    gaps[static_cast<int>(i)] = a.offset - glm::dot(a.normal, from);
-  }
-  if (chosen.size() > 1 && glm::determinant(products) < kDependent) return false;
-  const Vec3 solved = glm::inverse(products) * gaps;
-  for (std::size_t i = 0; i < chosen.size(); ++i) multipliers[i] = solved[static_cast<int>(i)];
-  return true;
-}
-
-/// A Newton step of the same system removes rounding errors.
-Vec3 displaced(const Vec3& from, std::span<const HalfSpace> planes,
-               std::span<const std::size_t> chosen, std::array<double, 3>& multipliers) {
-  Vec3 at = from;
-  for (std::size_t i = 0; i < chosen.size(); ++i) at += multipliers[i] * planes[chosen[i]].normal;
-  std::array<double, 3> more{};
-  on_planes(at, planes, chosen, more);
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    at += more[i] * planes[chosen[i]].normal;
-    multipliers[i] += more[i];
-  }
-  return at;
-}
-
-bool above_all(const Vec3& point, std::span<const HalfSpace> planes, double tolerance) {
-  return std::all_of(planes.begin(), planes.end(), [&](const HalfSpace& plane) {
-    return glm::dot(plane.normal, point) - plane.offset >= -tolerance;
-  });
-}
-
-}  // namespace
-
 std::optional<NearestPoint> nearest_point(const Vec3& from, std::span<const HalfSpace> planes,
                                           double tolerance) {
   std::optional<NearestPoint> nearest;
@@ -138,37 +164,6 @@ std::optional<NearestPoint> nearest_point(const Vec3& from, std::span<const Half
   }
   return nearest;
 }
-
-namespace {
-
-/// Normals that span a line, a plane or the space. A vector's multiple of each normal is its
-/// product with `up`.
-struct Generators {
-  std::array<Vec3, 3> normals, up;
-  std::size_t count = 0;
-
-  /// m, the residual of the vector after its non-negative multiples; infinity if a multiple is
-  /// negative, or so large that the residual is rounding.
-  double rest(const Vec3& vector, double most_multiple) const {
-    Vec3 left = vector;
-    std::array<double, 3> multiples{};
-    for (int step = 0; step < 2; ++step) {  // the second removes the rounding of the first
-      const Vec3 before = left;
-      for (std::size_t i = 0; i < count; ++i) {
-        const double more = glm::dot(up[i], before);
-        multiples[i] += more;
-        left -= more * normals[i];
-      }
-    }
-    for (std::size_t i = 0; i < count; ++i) {
-      if (!(multiples[i] >= 0 && multiples[i] <= most_multiple * glm::length(vector)))
-        return std::numeric_limits<double>::infinity();
-    }
-    return glm::length(left);
-  }
-};
-
-}  // namespace
 
 double distance_to_cone(const Vec3& vector, std::span<const Vec3> normals, double most_multiple) {
   double least = glm::length(vector);

@@ -202,45 +202,6 @@ struct PathBuilder {
   }
 };
 
-}  // namespace
-
-const char* to_string(PathKind kind) {
-  constexpr const char* kNames[] = {"smooth", "sliding", "fast", "plunges", "jumps", "aligned"};
-  return kNames[static_cast<int>(kind)];
-}
-
-std::vector<LineProbe> random_path(Random& random, PathKind kind, const stimuli::ConvexMesh& mesh,
-                                   double length, bool side, std::size_t ticks) {
-  PathBuilder builder{random, mesh, length, side, ticks, {}};
-  builder.path.reserve(ticks + 1);
-  const double far = 3 * mesh.size() + length;
-  builder.path.push_back(builder.probe(mesh.centre() + far * Vec3(0, 0, 1), Vec3(0, 0, 1), 0));
-  switch (kind) {
-    case PathKind::smooth:
-      builder.smooth();
-      break;
-    case PathKind::sliding:
-      builder.sliding();
-      break;
-    case PathKind::fast:
-      builder.fast();
-      break;
-    case PathKind::plunges:
-      builder.plunges();
-      break;
-    case PathKind::jumps:
-      builder.jumps();
-      break;
-    case PathKind::aligned:
-      builder.aligned();
-      break;
-  }
-  builder.path.resize(ticks);
-  return std::move(builder.path);
-}
-
-namespace {
-
 using Index = std::uint32_t;
 
 struct FacePlane {
@@ -352,6 +313,41 @@ stimuli::PolygonSoup some_soup(Random& random) {
 }
 
 }  // namespace
+
+const char* to_string(PathKind kind) {
+  constexpr const char* kNames[] = {"smooth", "sliding", "fast", "plunges", "jumps", "aligned"};
+  return kNames[static_cast<int>(kind)];
+}
+
+std::vector<LineProbe> random_path(Random& random, PathKind kind, const stimuli::ConvexMesh& mesh,
+                                   double length, bool side, std::size_t ticks) {
+  PathBuilder builder{random, mesh, length, side, ticks, {}};
+  builder.path.reserve(ticks + 1);
+  const double far = 3 * mesh.size() + length;
+  builder.path.push_back(builder.probe(mesh.centre() + far * Vec3(0, 0, 1), Vec3(0, 0, 1), 0));
+  switch (kind) {
+    case PathKind::smooth:
+      builder.smooth();
+      break;
+    case PathKind::sliding:
+      builder.sliding();
+      break;
+    case PathKind::fast:
+      builder.fast();
+      break;
+    case PathKind::plunges:
+      builder.plunges();
+      break;
+    case PathKind::jumps:
+      builder.jumps();
+      break;
+    case PathKind::aligned:
+      builder.aligned();
+      break;
+  }
+  builder.path.resize(ticks);
+  return std::move(builder.path);
+}
 
 stimuli::PolygonSoup cut_cube(Random& random, int cuts) {
   return random_block(random, cuts).tidy();

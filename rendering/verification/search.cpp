@@ -22,14 +22,6 @@
 #include "stimuli/primitives.h"
 
 namespace palpate::rendering {
-
-bool all_finite(const Rendering& r) {
-  return finite(r.force) && finite(r.torque) && finite(r.device1) && finite(r.device2) &&
-         finite(r.deepest.point) && finite(r.deepest.normal) && std::isfinite(r.deepest.depth) &&
-         std::isfinite(r.deepest.along) && finite(r.ideal.tip) && finite(r.ideal.tail) &&
-         finite(r.ideal_side);
-}
-
 namespace {
 
 /// Relative to the contact's force; levers relative to the lengths from which they were computed.
@@ -47,43 +39,6 @@ double force_error(const Renderer& renderer, const LineProbe& probe, const Rende
                    glm::length(r.torque - moment) / (full * lever),
                    glm::length(r.torque - by_devices) / (full * lever)});
 }
-
-}  // namespace
-
-LineProbe felt_probe(const Scene& scene, const Renderer& renderer, const LineProbe& probe) {
-  const ScenePart& part = scene.parts()[0];
-  const Vec3 tip = part.local_point(probe.tip);
-  return {tip, renderer.side_contact() ? part.local_point(probe.tail) : tip};
-}
-
-TickAudit audit_tick(const Scene& scene, const Renderer& renderer, const LineProbe& probe,
-                     const Rendering& r, double rounding) {
-  const ScenePart& part = scene.parts()[0];
-  const stimuli::ConvexMesh& mesh = *part.mesh;
-  TickAudit audit;
-  audit.tolerance =
-      rounding * mesh.size() + 1e-15 * (mesh.size() + glm::length(part.position) +
-                                        glm::length(probe.tip) + glm::length(probe.tail));
-  audit.finite = all_finite(r);
-  if (!audit.finite) return audit;
-  audit.depth = reference_depth(mesh, felt_probe(scene, renderer, probe)).depth;
-  if (r.contacts == 0) {
-    audit.missed = std::max(0.0, audit.depth);
-    audit.force = glm::length(r.force) + glm::length(r.torque) + glm::length(r.device1) +
-                  glm::length(r.device2);
-    return audit;
-  }
-  const LineProbe ideal = felt_probe(scene, renderer, r.ideal);
-  audit.penetrates = std::max(0.0, reference_depth(mesh, ideal).depth);
-  audit.floats = reference_gap(mesh, ideal);
-  audit.shallow = std::max(0.0, audit.depth - r.deepest.depth);
-  audit.force = force_error(renderer, probe, r, part.material.stiffness, mesh.size());
-  return audit;
-}
-
-// One walk of the search: its ticks, and the errors in them.
-
-namespace {
 
 constexpr int kFineSteps = 100;       // of a tick, by brute force
 constexpr double kFastestTurn = 0.1;  // rad a tick: 100 rad/s, faster than any hand
@@ -309,48 +264,6 @@ class Walk {
   SearchCounts counts_;
 };
 
-}  // namespace
-
-SearchCounts search_walk(const Renderer& renderer, std::uint64_t seed, std::uint64_t walk) {
-  return Walk(renderer, seed, walk).run();
-}
-
-SearchCounts& SearchCounts::operator+=(const SearchCounts& other) {
-  walks += other.walks;
-  ticks += other.ticks;
-  in_contact += other.in_contact;
-  entries += other.entries;
-  walked_finely += other.walked_finely;
-  passages += other.passages;
-  missed += other.missed;
-  passed_through += other.passed_through;
-  phantom += other.phantom;
-  penetrating += other.penetrating;
-  floating += other.floating;
-  shallow += other.shallow;
-  wrong_force += other.wrong_force;
-  not_finite += other.not_finite;
-  endless += other.endless;
-  faulted += other.faulted;
-  fallbacks += other.fallbacks;
-  turned_elsewhere += other.turned_elsewhere;
-  worst_penetration = std::max(worst_penetration, other.worst_penetration);
-  for (const SearchFault& fault : other.faults) {
-    if (faults.size() < kFaultsKept) faults.push_back(fault);
-  }
-  return *this;
-}
-
-SearchCounts search_walks(std::uint64_t seed, std::uint64_t first_walk, std::uint64_t walks) {
-  SearchCounts counts;
-  for (std::uint64_t walk = first_walk; walk < first_walk + walks; ++walk) {
-    counts += search_walk(walk % 4 == 0 ? point_renderer() : ray_renderer(), seed, walk);
-  }
-  return counts;
-}
-
-namespace {
-
 constexpr double kStylus = 0.12;  // m, of a stylus that carries a tool
 constexpr double kGrid = 0.01;    // m
 
@@ -407,98 +320,6 @@ OraclePart grid_part(Bytes& bytes) {
   }
   return part_of(soup);
 }
-
-}  // namespace
-
-UnionWalk random_union_walk(std::uint64_t seed, std::uint64_t walk, std::size_t ticks) {
-  Random random(seed, {walk, 0x756e});
-  const auto kind = random.below(8);
-  if (kind == 0) {
-    std::vector<std::uint8_t> bytes(400);
-    for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random.below(256));
-    return grid_walk(bytes, ticks);
-  }
-  UnionWalk drawn;
-  drawn.parts = random_cluster(random, 3 + static_cast<int>(random.below(6)));
-  drawn.tool = random_tool(random, 1 + static_cast<int>(walk % 3));
-  const double speeds[] = {1e-4, 3e-4, 1e-3, 5e-3};  // m a tick: 0.1 to 5 m/s at 1 kHz
-  const double speed = speeds[random.below(std::size(speeds))];
-  drawn.coincident = kind == 1;
-  drawn.path = kind == 1 ? aligned_path(random, drawn.parts, ticks)
-                         : random_tool_path(random, drawn.parts, drawn.tool, speed, ticks);
-  return drawn;
-}
-
-UnionWalk grid_walk(std::span<const std::uint8_t> data, std::size_t most_ticks) {
-  Bytes bytes(data);
-  UnionWalk walk;
-  walk.coincident = true;
-  const int parts = 2 + bytes.below(6), segments = 1 + bytes.below(3);
-  for (int i = 0; i < parts; ++i) walk.parts.push_back(grid_part(bytes));
-  walk.tool.push_back({Vec3(0), Vec3(0, 0, kGrid * (2 + bytes.below(8)))});
-  while (static_cast<int>(walk.tool.size()) < segments) {
-    const Vec3 from = bytes.grid_point(2), to = bytes.grid_point(2);
-    walk.tool.push_back({from, from == to ? from + Vec3(kGrid, 0, 0) : to});
-  }
-  // Starts far above; the tip moves along the axes from one multiple of 5 mm to another, in steps
-  // of whole millimetres.
-  std::array<int, 3> place{0, 0, 300};  // mm
-  Quat turned(1, 0, 0, 0);
-  const auto add = [&] {
-    if (walk.path.size() >= most_ticks) return;
-    walk.path.push_back({1e-3 * Vec3(place[0], place[1], place[2]), glm::mat3_cast(turned)});
-  };
-  add();
-  place[2] = 60;
-  while (bytes.any() && walk.path.size() < most_ticks) {
-    const auto axis = static_cast<std::size_t>(bytes.below(3));
-    if (bytes.below(4) == 0) {
-      const int steps = 1 + bytes.below(30);
-      const double angle = std::numbers::pi / 4 * (bytes.below(5) - 2) / steps;
-      Vec3 about(0);
-      about[static_cast<int>(axis)] = 1;
-      for (int i = 0; i < steps; ++i) {
-        turned = glm::normalize(glm::angleAxis(angle, about) * turned);
-        add();
-      }
-    } else {
-      const int to = 5 * (bytes.below(15) - 7), step = 1 + bytes.below(4);
-      while (place[axis] != to) {
-        place[axis] += std::clamp(to - place[axis], -step, step);
-        add();
-      }
-    }
-  }
-  return walk;
-}
-
-Scene union_scene(const UnionWalk& walk, double stiffness) {
-  std::vector<SceneObject> objects;
-  for (const OraclePart& part : walk.parts) {
-    SceneObject object;
-    object.mesh = part.mesh;
-    object.pose = part.pose;
-    object.material.stiffness = stiffness;
-    objects.push_back(std::move(object));
-  }
-  Tool tool;
-  if (!is_plain(walk.tool)) {
-    for (const OracleSegment& segment : walk.tool) {
-      tool.segments.push_back({segment.from, segment.to});
-    }
-  }
-  return Scene(std::move(objects), true, std::move(tool));
-}
-
-LineProbe union_probe(const UnionWalk& walk, const OraclePose& pose, RenderState& state) {
-  state.measured_side = pose.axes[0];
-  if (is_plain(walk.tool)) return {pose.place(walk.tool[0].from), pose.place(walk.tool[0].to)};
-  return {pose.tip, pose.place(Vec3(0, 0, kStylus))};
-}
-
-bool is_plain(const OracleTool& tool) { return tool.size() == 1; }
-
-namespace {
 
 constexpr double kSpring = 800;                       // N/m
 constexpr double kInside = 1e-12, kMinimal = 1e-9;    // sizes
@@ -681,6 +502,172 @@ class UnionWalker {
 };
 
 }  // namespace
+
+bool all_finite(const Rendering& r) {
+  return finite(r.force) && finite(r.torque) && finite(r.device1) && finite(r.device2) &&
+         finite(r.deepest.point) && finite(r.deepest.normal) && std::isfinite(r.deepest.depth) &&
+         std::isfinite(r.deepest.along) && finite(r.ideal.tip) && finite(r.ideal.tail) &&
+         finite(r.ideal_side);
+}
+
+LineProbe felt_probe(const Scene& scene, const Renderer& renderer, const LineProbe& probe) {
+  const ScenePart& part = scene.parts()[0];
+  const Vec3 tip = part.local_point(probe.tip);
+  return {tip, renderer.side_contact() ? part.local_point(probe.tail) : tip};
+}
+
+TickAudit audit_tick(const Scene& scene, const Renderer& renderer, const LineProbe& probe,
+                     const Rendering& r, double rounding) {
+  const ScenePart& part = scene.parts()[0];
+  const stimuli::ConvexMesh& mesh = *part.mesh;
+  TickAudit audit;
+  audit.tolerance =
+      rounding * mesh.size() + 1e-15 * (mesh.size() + glm::length(part.position) +
+                                        glm::length(probe.tip) + glm::length(probe.tail));
+  audit.finite = all_finite(r);
+  if (!audit.finite) return audit;
+  audit.depth = reference_depth(mesh, felt_probe(scene, renderer, probe)).depth;
+  if (r.contacts == 0) {
+    audit.missed = std::max(0.0, audit.depth);
+    audit.force = glm::length(r.force) + glm::length(r.torque) + glm::length(r.device1) +
+                  glm::length(r.device2);
+    return audit;
+  }
+  const LineProbe ideal = felt_probe(scene, renderer, r.ideal);
+  audit.penetrates = std::max(0.0, reference_depth(mesh, ideal).depth);
+  audit.floats = reference_gap(mesh, ideal);
+  audit.shallow = std::max(0.0, audit.depth - r.deepest.depth);
+  audit.force = force_error(renderer, probe, r, part.material.stiffness, mesh.size());
+  return audit;
+}
+
+// One walk of the search: its ticks, and the errors in them.
+
+SearchCounts search_walk(const Renderer& renderer, std::uint64_t seed, std::uint64_t walk) {
+  return Walk(renderer, seed, walk).run();
+}
+
+SearchCounts& SearchCounts::operator+=(const SearchCounts& other) {
+  walks += other.walks;
+  ticks += other.ticks;
+  in_contact += other.in_contact;
+  entries += other.entries;
+  walked_finely += other.walked_finely;
+  passages += other.passages;
+  missed += other.missed;
+  passed_through += other.passed_through;
+  phantom += other.phantom;
+  penetrating += other.penetrating;
+  floating += other.floating;
+  shallow += other.shallow;
+  wrong_force += other.wrong_force;
+  not_finite += other.not_finite;
+  endless += other.endless;
+  faulted += other.faulted;
+  fallbacks += other.fallbacks;
+  turned_elsewhere += other.turned_elsewhere;
+  worst_penetration = std::max(worst_penetration, other.worst_penetration);
+  for (const SearchFault& fault : other.faults) {
+    if (faults.size() < kFaultsKept) faults.push_back(fault);
+  }
+  return *this;
+}
+
+SearchCounts search_walks(std::uint64_t seed, std::uint64_t first_walk, std::uint64_t walks) {
+  SearchCounts counts;
+  for (std::uint64_t walk = first_walk; walk < first_walk + walks; ++walk) {
+    counts += search_walk(walk % 4 == 0 ? point_renderer() : ray_renderer(), seed, walk);
+  }
+  return counts;
+}
+
+UnionWalk random_union_walk(std::uint64_t seed, std::uint64_t walk, std::size_t ticks) {
+  Random random(seed, {walk, 0x756e});
+  const auto kind = random.below(8);
+  if (kind == 0) {
+    std::vector<std::uint8_t> bytes(400);
+    for (std::uint8_t& byte : bytes) byte = static_cast<std::uint8_t>(random.below(256));
+    return grid_walk(bytes, ticks);
+  }
+  UnionWalk drawn;
+  drawn.parts = random_cluster(random, 3 + static_cast<int>(random.below(6)));
+  drawn.tool = random_tool(random, 1 + static_cast<int>(walk % 3));
+  const double speeds[] = {1e-4, 3e-4, 1e-3, 5e-3};  // m a tick: 0.1 to 5 m/s at 1 kHz
+  const double speed = speeds[random.below(std::size(speeds))];
+  drawn.coincident = kind == 1;
+  drawn.path = kind == 1 ? aligned_path(random, drawn.parts, ticks)
+                         : random_tool_path(random, drawn.parts, drawn.tool, speed, ticks);
+  return drawn;
+}
+
+UnionWalk grid_walk(std::span<const std::uint8_t> data, std::size_t most_ticks) {
+  Bytes bytes(data);
+  UnionWalk walk;
+  walk.coincident = true;
+  const int parts = 2 + bytes.below(6), segments = 1 + bytes.below(3);
+  for (int i = 0; i < parts; ++i) walk.parts.push_back(grid_part(bytes));
+  walk.tool.push_back({Vec3(0), Vec3(0, 0, kGrid * (2 + bytes.below(8)))});
+  while (static_cast<int>(walk.tool.size()) < segments) {
+    const Vec3 from = bytes.grid_point(2), to = bytes.grid_point(2);
+    walk.tool.push_back({from, from == to ? from + Vec3(kGrid, 0, 0) : to});
+  }
+  // Starts far above; the tip moves along the axes from one multiple of 5 mm to another, in steps
+  // of whole millimetres.
+  std::array<int, 3> place{0, 0, 300};  // mm
+  Quat turned(1, 0, 0, 0);
+  const auto add = [&] {
+    if (walk.path.size() >= most_ticks) return;
+    walk.path.push_back({1e-3 * Vec3(place[0], place[1], place[2]), glm::mat3_cast(turned)});
+  };
+  add();
+  place[2] = 60;
+  while (bytes.any() && walk.path.size() < most_ticks) {
+    const auto axis = static_cast<std::size_t>(bytes.below(3));
+    if (bytes.below(4) == 0) {
+      const int steps = 1 + bytes.below(30);
+      const double angle = std::numbers::pi / 4 * (bytes.below(5) - 2) / steps;
+      Vec3 about(0);
+      about[static_cast<int>(axis)] = 1;
+      for (int i = 0; i < steps; ++i) {
+        turned = glm::normalize(glm::angleAxis(angle, about) * turned);
+        add();
+      }
+    } else {
+      const int to = 5 * (bytes.below(15) - 7), step = 1 + bytes.below(4);
+      while (place[axis] != to) {
+        place[axis] += std::clamp(to - place[axis], -step, step);
+        add();
+      }
+    }
+  }
+  return walk;
+}
+
+Scene union_scene(const UnionWalk& walk, double stiffness) {
+  std::vector<SceneObject> objects;
+  for (const OraclePart& part : walk.parts) {
+    SceneObject object;
+    object.mesh = part.mesh;
+    object.pose = part.pose;
+    object.material.stiffness = stiffness;
+    objects.push_back(std::move(object));
+  }
+  Tool tool;
+  if (!is_plain(walk.tool)) {
+    for (const OracleSegment& segment : walk.tool) {
+      tool.segments.push_back({segment.from, segment.to});
+    }
+  }
+  return Scene(std::move(objects), true, std::move(tool));
+}
+
+LineProbe union_probe(const UnionWalk& walk, const OraclePose& pose, RenderState& state) {
+  state.measured_side = pose.axes[0];
+  if (is_plain(walk.tool)) return {pose.place(walk.tool[0].from), pose.place(walk.tool[0].to)};
+  return {pose.tip, pose.place(Vec3(0, 0, kStylus))};
+}
+
+bool is_plain(const OracleTool& tool) { return tool.size() == 1; }
 
 UnionCounts& UnionCounts::operator+=(const UnionCounts& other) {
   walks += other.walks;

@@ -15,6 +15,7 @@
 #include "stimuli/primitives.h"
 
 namespace palpate::rendering {
+namespace {
 
 // Steepest descent of a point towards another one outside convex sums, each given by all of its
 // planes.
@@ -68,8 +69,6 @@ class Descent {
   bool in_crack_ = false;
 };
 
-namespace {
-
 constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 
 // Sine of half the opening of the narrowest groove that can hold a tool.
@@ -110,8 +109,6 @@ double entry(const OracleSum& sum, const Vec3& tip, const Vec3& goal) {
   }
   return enters < leaves ? std::min(enters, 1.0) : 1.0;
 }
-
-}  // namespace
 
 bool Descent::goal(const Vec3& tip, Choice& best) {
   touched_.clear();
@@ -193,8 +190,6 @@ double Descent::slides_off(const OracleSum& sum, const Vec3& tip, const Vec3& go
   return way;
 }
 
-namespace {
-
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 // An edge this nearly parallel to the segment spans no facet with it.
@@ -246,6 +241,59 @@ Mat3 turned_between(const Mat3& from, const Mat3& to, double fraction) {
 double angle_between(const Mat3& a, const Mat3& b) {
   const Quat turn = glm::quat_cast(glm::transpose(a) * b);
   return 2 * std::atan2(glm::length(Vec3(turn.x, turn.y, turn.z)), std::abs(turn.w));
+}
+
+// Compilers choose the order of a call's arguments: make every draw a statement of its own, so that
+// a walk is the same everywhere.
+
+Vec3 vector_between(Random& random, double low, double high) {
+  Vec3 drawn;
+  for (int k = 2; k >= 0; --k) drawn[k] = between(random, low, high);
+  return drawn;
+}
+
+constexpr double kClear = 2e-3;  // m, off the object at the start of a path
+
+struct Corner {
+  double x, z;
+};
+
+/// \param outline  convex, counter-clockwise seen from -y
+stimuli::PolygonSoup prism(const std::vector<Corner>& outline, double low_y, double high_y) {
+  stimuli::PolygonSoup soup;
+  const auto n = static_cast<std::uint32_t>(outline.size());
+  for (const double y : {low_y, high_y}) {
+    for (const Corner& corner : outline) soup.vertices.emplace_back(corner.x, y, corner.z);
+  }
+  std::vector<std::uint32_t> front, back;
+  for (std::uint32_t i = 0; i < n; ++i) {
+    const std::uint32_t next = (i + 1) % n;
+    front.push_back(i);
+    back.push_back(2 * n - 1 - i);
+    soup.faces.push_back({i, n + i, n + next, next});
+  }
+  soup.faces.push_back(std::move(front));
+  soup.faces.push_back(std::move(back));
+  return soup;
+}
+
+Vec3 right_wall(double opening) { return {-std::cos(opening / 2), 0, std::sin(opening / 2)}; }
+
+stimuli::PolygonSoup random_convex(Random& random) {
+  switch (random.below(6)) {
+    case 0:
+      return stimuli::icosphere(0.5, static_cast<int>(random.below(2)));
+    case 1: {
+      const auto sides = static_cast<int>(3 + random.below(9));
+      return stimuli::cone(0.5, between(random, 0.6, 1.5), sides);
+    }
+    case 2: {
+      const auto sides = static_cast<int>(3 + random.below(9));
+      return stimuli::cylinder(0.5, between(random, 0.6, 1.5), sides);
+    }
+    default:
+      return stimuli::cube(1);
+  }
 }
 
 }  // namespace
@@ -415,63 +463,6 @@ bool UnionOracle::held_in_gap(const OraclePose& ideal, const Vec3& virtual_tip, 
   const std::vector<OracleSum> all = sums(ideal.axes);
   return Descent(all, virtual_tip, touching).unbalanced(ideal.tip, kMostLeverage) <= least;
 }
-
-namespace {
-
-// Compilers choose the order of a call's arguments: make every draw a statement of its own, so that
-// a walk is the same everywhere.
-
-Vec3 vector_between(Random& random, double low, double high) {
-  Vec3 drawn;
-  for (int k = 2; k >= 0; --k) drawn[k] = between(random, low, high);
-  return drawn;
-}
-
-constexpr double kClear = 2e-3;  // m, off the object at the start of a path
-
-struct Corner {
-  double x, z;
-};
-
-/// \param outline  convex, counter-clockwise seen from -y
-stimuli::PolygonSoup prism(const std::vector<Corner>& outline, double low_y, double high_y) {
-  stimuli::PolygonSoup soup;
-  const auto n = static_cast<std::uint32_t>(outline.size());
-  for (const double y : {low_y, high_y}) {
-    for (const Corner& corner : outline) soup.vertices.emplace_back(corner.x, y, corner.z);
-  }
-  std::vector<std::uint32_t> front, back;
-  for (std::uint32_t i = 0; i < n; ++i) {
-    const std::uint32_t next = (i + 1) % n;
-    front.push_back(i);
-    back.push_back(2 * n - 1 - i);
-    soup.faces.push_back({i, n + i, n + next, next});
-  }
-  soup.faces.push_back(std::move(front));
-  soup.faces.push_back(std::move(back));
-  return soup;
-}
-
-Vec3 right_wall(double opening) { return {-std::cos(opening / 2), 0, std::sin(opening / 2)}; }
-
-stimuli::PolygonSoup random_convex(Random& random) {
-  switch (random.below(6)) {
-    case 0:
-      return stimuli::icosphere(0.5, static_cast<int>(random.below(2)));
-    case 1: {
-      const auto sides = static_cast<int>(3 + random.below(9));
-      return stimuli::cone(0.5, between(random, 0.6, 1.5), sides);
-    }
-    case 2: {
-      const auto sides = static_cast<int>(3 + random.below(9));
-      return stimuli::cylinder(0.5, between(random, 0.6, 1.5), sides);
-    }
-    default:
-      return stimuli::cube(1);
-  }
-}
-
-}  // namespace
 
 OraclePart part_of(const stimuli::PolygonSoup& soup) {
   return {std::make_shared<const stimuli::ConvexMesh>(soup), Pose{}};

@@ -14,7 +14,6 @@ thread_local std::uint64_t count = 0;
 }  // namespace
 
 namespace palpate::runner::bench {
-
 std::uint64_t allocations() { return count; }
 bool counts_allocations() { return PALPATE_COUNT_ALLOCATIONS; }
 

@@ -265,10 +265,6 @@ void print(const Request& request, const data::ExportResult& done) {
   }
 }
 
-}  // namespace
-
-namespace {
-
 void export_sweep(const Request& request, bool times_given) {
   if (request.format != "csv" || !request.codebook.empty() || times_given || request.pages) {
     throw UsageError(request.database +

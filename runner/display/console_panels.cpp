@@ -62,48 +62,6 @@ void draw_choices(const Checklist& list, EndRequest& ending,
   }
 }
 
-}  // namespace
-
-void draw_checklist(const Checklist& list, EndRequest& ending,
-                    std::vector<ConsoleCommand>& commands) {
-  using State = Checklist::Step::State;
-  const float font = ImGui::GetFontSize();
-  std::size_t due = 0;
-  while (due < list.steps.size() && list.steps[due].state != State::now) ++due;
-  coloured_text(kQuiet, "Before the first trial: step " +
-                            std::to_string(std::min(due + 1, list.steps.size())) + " of " +
-                            std::to_string(list.steps.size()));
-  ImGui::PushFont(ImGui::GetIO().Fonts->Fonts.back());
-  std::string instruction = list.instruction;
-  if (!instruction.empty() && instruction[0] >= 'a' && instruction[0] <= 'z') instruction[0] -= 32;
-  wrapped_text(kBright, instruction);
-  ImGui::PopFont();
-  draw_choices(list, ending, commands);
-  ImGui::Dummy({0, 0.4F * font});
-  const auto& fonts = ImGui::GetIO().Fonts->Fonts;
-  const bool small = ImGui::GetContentRegionAvail().y < 9 * font;
-  ImGui::PushFont(small ? fonts.front() : fonts.back());
-  if (ImGui::BeginTable("steps", 2)) {
-    ImGui::TableSetupColumn("state", ImGuiTableColumnFlags_WidthFixed, 8 * font);
-    ImGui::TableSetupColumn("step");
-    for (const Checklist::Step& step : list.steps) {
-      const bool now = step.state == State::now;
-      ImGui::TableNextRow();
-      ImGui::TableNextColumn();
-      coloured_text(step.state == State::done ? kGood
-                    : now                     ? kBright
-                                              : kQuiet,
-                    label_of(step.state));
-      ImGui::TableNextColumn();
-      coloured_text(now ? kBright : kQuiet, step.words);
-    }
-    ImGui::EndTable();
-  }
-  ImGui::PopFont();
-}
-
-namespace {
-
 constexpr ImU32 kAxisColour = IM_COL32(153, 163, 176, 255);
 
 /// The area of a plot within its titled frame, px.
@@ -144,7 +102,142 @@ double round_up(double value) {
   return 10 * power;
 }
 
+bool off(const ConsoleState& state) {
+  return (state.sample.faults & servo::servo_fault::kTripped) != 0;
+}
+
+void progress(const ConsoleState& state) {
+  ImGui::ProgressBar(static_cast<float>(fraction_done(state)), {-1, 6}, "");
+}
+
+/// The study and the state of the session. Words that do not fit beside the state replace the study
+/// above it: no button may move when the words change.
+void headline(const ConsoleState& state) {
+  const float font = ImGui::GetFontSize(), gap = ImGui::GetStyle().ItemSpacing.x;
+  const float room = ImGui::GetContentRegionAvail().x;
+  const ImVec4 colour = state.stop_plan.empty() ? kBright : kBad;
+  const std::string title = state_title(state), detail = state_detail(state);
+  ImFont* const large = ImGui::GetIO().Fonts->Fonts.back();
+  ImGui::PushFont(large);
+  const double titled = text_width(title);
+  ImGui::PopFont();
+  const bool beside = titled + gap + text_width(detail) <= room;
+  const std::string study =
+      state.study + "  ·  " + state.participant + "  ·  session " + std::to_string(state.session);
+  coloured_text(beside ? kQuiet : colour, shortened(beside ? study : detail, room, text_width));
+  ImGui::PushFont(large);
+  coloured_text(state.state == "fault" ? kBad : kBright, shortened(title, room, text_width));
+  ImGui::PopFont();
+  if (!beside) return;
+  const ImVec2 corner = ImGui::GetItemRectMax();
+  ImGui::GetWindowDrawList()->AddText({corner.x + gap, corner.y - 1.35F * font},
+                                      ImGui::GetColorU32(colour), detail.c_str());
+}
+
+std::string of(int number, int all) {
+  return all > 0 ? std::to_string(number) + " of " + std::to_string(all) : "-";
+}
+
+/// A table of names and values. \param compact  two values in a row
+bool begin_values(const char* name, bool compact) {
+  if (!ImGui::BeginTable(name, compact ? 4 : 2)) return false;
+  for (int i = 0; i < (compact ? 2 : 1); ++i) {
+    ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed,
+                            (compact ? 6.0F : 7.5F) * ImGui::GetFontSize());
+    ImGui::TableSetupColumn("value");
+  }
+  return true;
+}
+
+void draw_ending(EndRequest& ending, float half, std::vector<ConsoleCommand>& commands) {
+  if (!std::exchange(ending.shown, true)) ImGui::SetScrollHereY(0);  // in a small window
+  ImGui::PushTextWrapPos(0);
+  coloured_text(kBright,
+                "End the session now? The trial under way is cut off. All answers are stored; "
+                "the session can be resumed unless the participant withdraws.");
+  ImGui::PopTextWrapPos();
+  ImGui::SetNextItemWidth(-1);
+  ImGui::InputTextWithHint("##why", "Reason, stored in the record", ending.reason.data(),
+                           ending.reason.size());
+  const auto end = [&](const char* words, const std::string& why) {
+    if (!wide_button(words, half)) return;
+    commands.push_back({Kind::quit, why, 0});
+    ending = {};
+  };
+  end("End the session", ending.reason.data());
+  ImGui::SameLine();
+  if (wide_button("Back", half)) ending = {};
+  end("Participant withdraws", "withdrawn");
+}
+
+void draw_correction(const ConsoleState& state, Correction& correction, float half,
+                     std::vector<ConsoleCommand>& commands) {
+  correction.at = std::min(correction.at, state.given.size() - 1);
+  const GivenAnswer& one = state.given[correction.at];
+  wrapped_text(kBright, one.page + ", " + one.question + ": " +
+                            (one.answer.empty() ? "(left out)" : one.answer));
+  const auto turn = [&](const char* words, std::size_t to) {
+    ImGui::BeginDisabled(to >= state.given.size());
+    if (wide_button(words, half)) {
+      correction.at = to;
+      correction.answer = {};
+    }
+    ImGui::EndDisabled();
+  };
+  turn("Answer before", correction.at - 1);  // wraps to a large number at the first
+  ImGui::SameLine();
+  turn("Next answer", correction.at + 1);
+  ImGui::SetNextItemWidth(-1);
+  ImGui::InputTextWithHint("##corrected", "The right answer; the one before stays on record",
+                           correction.answer.data(), correction.answer.size());
+  if (wide_button("Store the correction", half)) {
+    const std::string answer = correction.answer.data();
+    commands.push_back({Kind::correct, one.page + " " + one.question + " " + answer, 0});
+    correction = {};
+  }
+  ImGui::SameLine();
+  if (wide_button("Back", half)) correction = {};
+}
+
 }  // namespace
+
+void draw_checklist(const Checklist& list, EndRequest& ending,
+                    std::vector<ConsoleCommand>& commands) {
+  using State = Checklist::Step::State;
+  const float font = ImGui::GetFontSize();
+  std::size_t due = 0;
+  while (due < list.steps.size() && list.steps[due].state != State::now) ++due;
+  coloured_text(kQuiet, "Before the first trial: step " +
+                            std::to_string(std::min(due + 1, list.steps.size())) + " of " +
+                            std::to_string(list.steps.size()));
+  ImGui::PushFont(ImGui::GetIO().Fonts->Fonts.back());
+  std::string instruction = list.instruction;
+  if (!instruction.empty() && instruction[0] >= 'a' && instruction[0] <= 'z') instruction[0] -= 32;
+  wrapped_text(kBright, instruction);
+  ImGui::PopFont();
+  draw_choices(list, ending, commands);
+  ImGui::Dummy({0, 0.4F * font});
+  const auto& fonts = ImGui::GetIO().Fonts->Fonts;
+  const bool small = ImGui::GetContentRegionAvail().y < 9 * font;
+  ImGui::PushFont(small ? fonts.front() : fonts.back());
+  if (ImGui::BeginTable("steps", 2)) {
+    ImGui::TableSetupColumn("state", ImGuiTableColumnFlags_WidthFixed, 8 * font);
+    ImGui::TableSetupColumn("step");
+    for (const Checklist::Step& step : list.steps) {
+      const bool now = step.state == State::now;
+      ImGui::TableNextRow();
+      ImGui::TableNextColumn();
+      coloured_text(step.state == State::done ? kGood
+                    : now                     ? kBright
+                                              : kQuiet,
+                    label_of(step.state));
+      ImGui::TableNextColumn();
+      coloured_text(now ? kBright : kQuiet, step.words);
+    }
+    ImGui::EndTable();
+  }
+  ImGui::PopFont();
+}
 
 void draw_forces(const std::deque<ForcePoint>& forces, float width, float height) {
   double most = 1;
@@ -220,57 +313,6 @@ void draw_scores(const ConsoleState& state, float width, float height) {
   }
 }
 
-namespace {
-
-bool off(const ConsoleState& state) {
-  return (state.sample.faults & servo::servo_fault::kTripped) != 0;
-}
-
-void progress(const ConsoleState& state) {
-  ImGui::ProgressBar(static_cast<float>(fraction_done(state)), {-1, 6}, "");
-}
-
-/// The study and the state of the session. Words that do not fit beside the state replace the study
-/// above it: no button may move when the words change.
-void headline(const ConsoleState& state) {
-  const float font = ImGui::GetFontSize(), gap = ImGui::GetStyle().ItemSpacing.x;
-  const float room = ImGui::GetContentRegionAvail().x;
-  const ImVec4 colour = state.stop_plan.empty() ? kBright : kBad;
-  const std::string title = state_title(state), detail = state_detail(state);
-  ImFont* const large = ImGui::GetIO().Fonts->Fonts.back();
-  ImGui::PushFont(large);
-  const double titled = text_width(title);
-  ImGui::PopFont();
-  const bool beside = titled + gap + text_width(detail) <= room;
-  const std::string study =
-      state.study + "  ·  " + state.participant + "  ·  session " + std::to_string(state.session);
-  coloured_text(beside ? kQuiet : colour, shortened(beside ? study : detail, room, text_width));
-  ImGui::PushFont(large);
-  coloured_text(state.state == "fault" ? kBad : kBright, shortened(title, room, text_width));
-  ImGui::PopFont();
-  if (!beside) return;
-  const ImVec2 corner = ImGui::GetItemRectMax();
-  ImGui::GetWindowDrawList()->AddText({corner.x + gap, corner.y - 1.35F * font},
-                                      ImGui::GetColorU32(colour), detail.c_str());
-}
-
-std::string of(int number, int all) {
-  return all > 0 ? std::to_string(number) + " of " + std::to_string(all) : "-";
-}
-
-/// A table of names and values. \param compact  two values in a row
-bool begin_values(const char* name, bool compact) {
-  if (!ImGui::BeginTable(name, compact ? 4 : 2)) return false;
-  for (int i = 0; i < (compact ? 2 : 1); ++i) {
-    ImGui::TableSetupColumn("name", ImGuiTableColumnFlags_WidthFixed,
-                            (compact ? 6.0F : 7.5F) * ImGui::GetFontSize());
-    ImGui::TableSetupColumn("value");
-  }
-  return true;
-}
-
-}  // namespace
-
 void draw_status(const ConsoleState& state, bool hidden, bool compact) {
   if (compact && !state.checklist.steps.empty()) return;  // no trial yet: the space is needed
   headline(state);
@@ -291,62 +333,6 @@ void draw_status(const ConsoleState& state, bool hidden, bool compact) {
                 (state.remaining > 0 ? ", about " + duration_text(state.remaining) + " left" : ""));
   ImGui::EndTable();
 }
-
-namespace {
-
-using Kind = ConsoleCommand::Kind;
-
-void draw_ending(EndRequest& ending, float half, std::vector<ConsoleCommand>& commands) {
-  if (!std::exchange(ending.shown, true)) ImGui::SetScrollHereY(0);  // in a small window
-  ImGui::PushTextWrapPos(0);
-  coloured_text(kBright,
-                "End the session now? The trial under way is cut off. All answers are stored; "
-                "the session can be resumed unless the participant withdraws.");
-  ImGui::PopTextWrapPos();
-  ImGui::SetNextItemWidth(-1);
-  ImGui::InputTextWithHint("##why", "Reason, stored in the record", ending.reason.data(),
-                           ending.reason.size());
-  const auto end = [&](const char* words, const std::string& why) {
-    if (!wide_button(words, half)) return;
-    commands.push_back({Kind::quit, why, 0});
-    ending = {};
-  };
-  end("End the session", ending.reason.data());
-  ImGui::SameLine();
-  if (wide_button("Back", half)) ending = {};
-  end("Participant withdraws", "withdrawn");
-}
-
-void draw_correction(const ConsoleState& state, Correction& correction, float half,
-                     std::vector<ConsoleCommand>& commands) {
-  correction.at = std::min(correction.at, state.given.size() - 1);
-  const GivenAnswer& one = state.given[correction.at];
-  wrapped_text(kBright, one.page + ", " + one.question + ": " +
-                            (one.answer.empty() ? "(left out)" : one.answer));
-  const auto turn = [&](const char* words, std::size_t to) {
-    ImGui::BeginDisabled(to >= state.given.size());
-    if (wide_button(words, half)) {
-      correction.at = to;
-      correction.answer = {};
-    }
-    ImGui::EndDisabled();
-  };
-  turn("Answer before", correction.at - 1);  // wraps to a large number at the first
-  ImGui::SameLine();
-  turn("Next answer", correction.at + 1);
-  ImGui::SetNextItemWidth(-1);
-  ImGui::InputTextWithHint("##corrected", "The right answer; the one before stays on record",
-                           correction.answer.data(), correction.answer.size());
-  if (wide_button("Store the correction", half)) {
-    const std::string answer = correction.answer.data();
-    commands.push_back({Kind::correct, one.page + " " + one.question + " " + answer, 0});
-    correction = {};
-  }
-  ImGui::SameLine();
-  if (wide_button("Back", half)) correction = {};
-}
-
-}  // namespace
 
 void draw_buttons(const ConsoleState& state, bool compact, EndRequest& ending,
                   Correction& correction, std::vector<ConsoleCommand>& commands) {

@@ -35,6 +35,7 @@
 #include "runner/servo/sample.h"
 
 namespace palpate::runner::display {
+namespace {
 
 // Contents of the window of a scene: its panels, and their state between frames.
 
@@ -163,15 +164,9 @@ std::string ExploreClip::finish() {
   return drawn_ > 0 ? animation_.finish(static_cast<double>(drawn_) * kEvery) : std::string();
 }
 
-// Pointer input over ExploreView's picture.
-
-namespace {
-
 constexpr float kOrbitPerPixel = 0.008F;  // rad
 constexpr float kZoomPerNotch = 1.12F;
 constexpr ImU32 kQuietInk = IM_COL32(150, 158, 168, 255);
-
-}  // namespace
 
 std::string ExploreView::hint() const {
   if (!not_pulled_.empty()) return not_pulled_;
@@ -304,10 +299,6 @@ void ExploreView::steer(const Modifiers& modifiers, float x, float y) {
                  });
 }
 
-// The panels of ExploreView: time line, values, looks, material.
-
-namespace {
-
 constexpr float kSliderWords = 10;  // widths of a letter, for name and value beside a slider
 
 double force_of(const SceneMoment& moment) {
@@ -327,8 +318,6 @@ void for_each_chosen(std::vector<stimuli::ObjectSpec>& objects, int chosen,
     if (chosen == static_cast<int>(i) || chosen == static_cast<int>(objects.size()))
       visit(objects[i]);
 }
-
-}  // namespace
 
 void ExploreView::draw_time(float width) {
   const float font = ImGui::GetFontSize(), gap = ImGui::GetStyle().ItemSpacing.x;
@@ -517,8 +506,6 @@ void ExploreView::draw_material() {
   }
 }
 
-namespace {
-
 constexpr double kWindowThickness = 1.3;  // of the tool
 
 const char* state_in_words(Timeline::State state, bool live) {
@@ -532,8 +519,6 @@ const char* state_in_words(Timeline::State state, bool live) {
   }
   return "";
 }
-
-}  // namespace
 
 ExploreView::ExploreView(ExploreSettings settings, TouchSource& source)
     : settings_(std::move(settings)),
@@ -782,8 +767,6 @@ void ExploreView::draw_faults() {
   }
 }
 
-namespace {
-
 constexpr double kExploreFrame = 1.0 / 60;                 // s
 constexpr double kEveryMonitors = 0.5;                     // s
 constexpr int kStepsOfPage = 100;                          // ticks
@@ -959,6 +942,10 @@ class ExploreWindow {
 };
 
 }  // namespace
+
+// Pointer input over ExploreView's picture.
+
+// The panels of ExploreView: time line, values, looks, material.
 
 void explore_in_window(ExploreSettings settings, TouchSource& source) {
   ExploreWindow(std::move(settings), source).run();

@@ -69,29 +69,6 @@ void style_console(float scale) {
   style.ScaleAllSizes(scale);
 }
 
-}  // namespace
-
-ImGuiContext* begin_imgui(GLFWwindow* window, const std::vector<std::string>& texts, float scale) {
-  ImGuiContext* const context = ImGui::CreateContext();
-  ImGui::GetIO().IniFilename = nullptr;  // write no file
-  load_console_fonts(texts, scale);
-  style_console(scale);
-  glfwSetWindowFocusCallback(window, &ImGui_ImplGlfw_WindowFocusCallback);
-  glfwSetCursorEnterCallback(window, &ImGui_ImplGlfw_CursorEnterCallback);
-  glfwSetScrollCallback(window, &ImGui_ImplGlfw_ScrollCallback);
-  ImGui_ImplGlfw_InitForOpenGL(window, false);
-  ImGui_ImplOpenGL3_Init("#version 330 core");
-  return context;
-}
-
-void end_imgui(ImGuiContext* context) {
-  ImGui_ImplOpenGL3_Shutdown();
-  ImGui_ImplGlfw_Shutdown();
-  ImGui::DestroyContext(context);
-}
-
-namespace {
-
 template <auto destroy>
 struct With {
   template <class T>
@@ -173,6 +150,25 @@ std::vector<unsigned short> take(FcPattern* font, std::set<unsigned>& letters) {
 }
 
 }  // namespace
+
+ImGuiContext* begin_imgui(GLFWwindow* window, const std::vector<std::string>& texts, float scale) {
+  ImGuiContext* const context = ImGui::CreateContext();
+  ImGui::GetIO().IniFilename = nullptr;  // write no file
+  load_console_fonts(texts, scale);
+  style_console(scale);
+  glfwSetWindowFocusCallback(window, &ImGui_ImplGlfw_WindowFocusCallback);
+  glfwSetCursorEnterCallback(window, &ImGui_ImplGlfw_CursorEnterCallback);
+  glfwSetScrollCallback(window, &ImGui_ImplGlfw_ScrollCallback);
+  ImGui_ImplGlfw_InitForOpenGL(window, false);
+  ImGui_ImplOpenGL3_Init("#version 330 core");
+  return context;
+}
+
+void end_imgui(ImGuiContext* context) {
+  ImGui_ImplOpenGL3_Shutdown();
+  ImGui_ImplGlfw_Shutdown();
+  ImGui::DestroyContext(context);
+}
 
 std::vector<FontChoice> choose_fonts(const std::vector<std::string>& texts) {
   std::vector<FontChoice> choices;

@@ -18,6 +18,8 @@ constexpr double kMostPress = 0.03, kFarthest = 0.2;  // m
 constexpr double kDepthPerPixel = 0.0004;             // m
 constexpr double kTurnPerPixel = 0.006;               // rad
 
+constexpr double kThickness = 1.6;  // the view is small beside the panels
+
 }  // namespace
 
 PointerControl::PointerControl(devices::MouseStylus& device, const WorkspaceMap& workspace)
@@ -82,12 +84,6 @@ void PointerControl::step(const PointerMotion& pointer, const Camera& camera,
   }
   device_.set_target(target_.stylus());
 }
-
-namespace {
-
-constexpr double kThickness = 1.6;  // the view is small beside the panels
-
-}  // namespace
 
 SceneView::SceneView() : renderer_(SceneRenderer::live_quality()) {}
 

@@ -17,33 +17,6 @@
 #include "runner/display/console_words.h"
 
 namespace palpate::runner::display {
-
-std::string wrapped(const std::string& text, std::size_t columns) {
-  if (columns < 20) return text;
-  std::string out = text;
-  std::size_t start = 0, space = 0, column = 0;  // of the line; the last space; letters so far
-  for (std::size_t i = 0; i < out.size(); ++i) {
-    if (continues_character(out[i])) continue;
-    if (out[i] == '\n') {
-      start = i + 1;
-      column = 0;
-      continue;
-    }
-    if (out[i] == ' ') space = i;
-    if (++column <= columns || space <= start) continue;
-    out[space] = '\n';
-    start = space + 1;
-    column = 0;
-    i = space;
-  }
-  return out;
-}
-
-std::size_t columns_of(int file) {
-  winsize size{};
-  return ioctl(file, TIOCGWINSZ, &size) == 0 ? size.ws_col : 0;
-}
-
 namespace {
 
 using Kind = ConsoleCommand::Kind;
@@ -84,7 +57,201 @@ std::string lower(std::string_view text) {
   return out;
 }
 
+constexpr Page::Kind kText = Page::Kind::text;
+
+std::string text_of(const Page& page) {
+  std::string text = printable_lines(page.text);
+  if (page.kind == Page::Kind::neutral && !page.go) return text;
+  if (page.seconds_left > 0) text += "\n[" + std::to_string(page.seconds_left) + " s]";
+  if (page.done > 0 && page.kind != Page::Kind::feedback)
+    text += "\n[" + std::to_string(page.done) + " of " + std::to_string(page.trials) + "]";
+  if (page.parts > 1)
+    text += "\n[" + std::to_string(page.part) + " / " + std::to_string(page.parts) + "]";
+  if (page.picture) text += "\n[a picture, which the window shows]";
+  if (page.kind == kText && page.keys.empty()) text += "\n[space bar: go on]";
+  if (page.kind == Page::Kind::message && page.parts == 0 && page.typing == Page::Typing::none)
+    return text;  // nothing to answer now
+  if (!page.keys.empty() && page.kind != Page::Kind::neutral) text += "\n";
+  if (page.typing != Page::Typing::none) text += "\n> " + printable(page.typed);
+  for (const auto& [key, answer] : page.keys) {
+    text += text.empty() ? "" : "   ";
+    if (key == page.chosen) text += '*';
+    text += printable(key);
+    text += ' ';
+    text += printable(answer);
+  }
+  if (page.back) text += "\n[left arrow: back]";
+  return text;
+}
+
+std::string checklist_text(const Checklist& list) {
+  std::size_t due = 0;
+  while (due < list.steps.size() && list.steps[due].state != Checklist::Step::State::now) ++due;
+  std::string text = "* step " + std::to_string(due + 1) + " of " +
+                     std::to_string(list.steps.size()) + ": " + printable(list.instruction);
+  std::string choices;
+  for (const auto& [kind, meaning] : list.choices) {
+    choices += choices.empty() ? " (" : "; ";
+    choices += "':" + std::string(text_command(kind)) + "': " + meaning;
+  }
+  return text + choices + (choices.empty() ? "\n" : ")\n");
+}
+
+std::string status(const ConsoleState& state) {
+  std::string text = "[" + state.state;
+  if (state.practice && (state.state == "trial" || state.state == "homing")) text += ", practice";
+  if (state.trial > 0) {
+    text += ", block " + std::to_string(state.block) + " of " + std::to_string(state.blocks) +
+            ", trial " + trial_of(state);
+  }
+  if (state.remaining > 60)
+    text += ", " + std::to_string(static_cast<int>(state.remaining / 60)) + " min left";
+  if (state.missed_ticks > 0)
+    text += ", " + std::to_string(state.missed_ticks) +
+            (state.missed_ticks == 1 ? " tick missed" : " ticks missed");
+  if (!state.held_by.empty()) text += ": " + printable(state.held_by);
+  return text + "]\n";
+}
+
+using std::chrono::steady_clock;
+
+constexpr std::size_t kMaxWrite = 256;  // bytes; poll() promises that a terminal takes these
+constexpr auto kFlushTime = std::chrono::milliseconds(300);  // for the remaining text at the end
+
+class TextDisplay final : public DisplayLoop {
+ public:
+  explicit TextDisplay(const TextSettings& settings) : settings_(settings) {
+    print(std::string("Text display: keys answer; ") + text_commands_help());
+  }
+
+  ParticipantScreen& participant() override { return screen_; }
+  ExperimenterConsole& console() override { return console_; }
+
+  void run() override {
+    try {
+      while (!ended_.load()) step(-1);
+    } catch (...) {
+      screen_.close();
+      throw;
+    }
+    const auto deadline = steady_clock::now() + kFlushTime;
+    collect();
+    while (!pending_.empty() && steady_clock::now() < deadline) step(20);
+  }
+
+  void end() noexcept override {
+    ended_ = true;
+    wake_.signal();
+  }
+
+ private:
+  void print(const std::string& text) { out_.add({STDERR_FILENO, text}); }
+
+  void collect() {
+    for (Output& output : out_.take()) {
+      if (output.text.front() != '\r') {
+        output.text = wrapped(output.text, columns_of(output.file));
+        // Write a command that is being typed again below the new text.
+        if (terminal_.on() && !input_.line().empty())
+          output.text = "\r\x1b[K" + output.text + printable(input_.line());
+      }
+      pending_.push_back(std::move(output));
+    }
+  }
+
+  /// Waits for a key, for text to write, or until the output accepts it.
+  void step(int timeout_ms) {
+    collect();
+    std::array<pollfd, 3> files = {{{wake_.file(), POLLIN, 0},
+                                    {input_ended_ ? -1 : STDIN_FILENO, POLLIN, 0},
+                                    {pending_.empty() ? -1 : pending_.front().file, POLLOUT, 0}}};
+    if (poll(files.data(), files.size(), timeout_ms) < 0) return;  // a signal
+    if (files[0].revents != 0) wake_.clear();
+    if (files[1].revents != 0) read_input();
+    if (files[2].revents != 0) write_output();
+  }
+
+  void read_input() {
+    std::array<char, 512> bytes{};
+    const ssize_t got = read(STDIN_FILENO, bytes.data(), bytes.size());
+    const std::int64_t now = settings_.clock->now_ns();
+    if (got < 0 && (errno == EINTR || errno == EAGAIN)) return;
+    if (got <= 0) {
+      input_ended_ = true;
+      screen_.close();
+      return;
+    }
+    const std::string before = input_.line();
+    for (const TextInput::Event& event :
+         input_.feed({bytes.data(), static_cast<std::size_t>(got)}, now)) {
+      dispatch(event);
+    }
+    if (terminal_.on() && input_.line() != before) {
+      print("\r\x1b[K" + printable(input_.line()) + (input_.line().empty() ? "\n" : ""));
+    }
+  }
+
+  void dispatch(const TextInput::Event& event) {
+    if (const auto* press = std::get_if<KeyPress>(&event)) {
+      screen_.press(*press);
+    } else if (const auto* command = std::get_if<ConsoleCommand>(&event)) {
+      if (command->kind == ConsoleCommand::Kind::emergency_zero && settings_.emergency)
+        settings_.emergency();
+      console_.add_command(*command);
+    } else {
+      print(text_commands_help());
+    }
+  }
+
+  void write_output() {
+    Output& output = pending_.front();
+    const std::string_view now = std::string_view(output.text).substr(0, kMaxWrite);
+    const ssize_t written = write(output.file, now.data(), now.size());
+    if (written < 0 && (errno == EINTR || errno == EAGAIN)) return;
+    // Drop the text on an error (closed pipe).
+    output.text.erase(0, written < 0 ? output.text.size() : static_cast<std::size_t>(written));
+    if (output.text.empty()) pending_.pop_front();
+  }
+
+  const TextSettings settings_;
+  RawTerminal terminal_;
+  WakeEvent wake_;
+  EventQueue<Output> out_;
+  std::deque<Output> pending_;
+  TextScreen screen_{out_, wake_};
+  TextConsole console_{out_, wake_};
+  TextInput input_;
+  bool input_ended_ = false;
+  std::atomic<bool> ended_{false};
+};
+
 }  // namespace
+
+std::string wrapped(const std::string& text, std::size_t columns) {
+  if (columns < 20) return text;
+  std::string out = text;
+  std::size_t start = 0, space = 0, column = 0;  // of the line; the last space; letters so far
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    if (continues_character(out[i])) continue;
+    if (out[i] == '\n') {
+      start = i + 1;
+      column = 0;
+      continue;
+    }
+    if (out[i] == ' ') space = i;
+    if (++column <= columns || space <= start) continue;
+    out[space] = '\n';
+    start = space + 1;
+    column = 0;
+    i = space;
+  }
+  return out;
+}
+
+std::size_t columns_of(int file) {
+  winsize size{};
+  return ioctl(file, TIOCGWINSZ, &size) == 0 ? size.ws_col : 0;
+}
 
 const char* text_commands_help() {
   return "commands, each ended by Enter:\n"
@@ -221,66 +388,6 @@ std::vector<TextInput::Event> TextInput::feed(std::string_view bytes, std::int64
   return out;
 }
 
-namespace {
-
-constexpr Page::Kind kText = Page::Kind::text;
-
-std::string text_of(const Page& page) {
-  std::string text = printable_lines(page.text);
-  if (page.kind == Page::Kind::neutral && !page.go) return text;
-  if (page.seconds_left > 0) text += "\n[" + std::to_string(page.seconds_left) + " s]";
-  if (page.done > 0 && page.kind != Page::Kind::feedback)
-    text += "\n[" + std::to_string(page.done) + " of " + std::to_string(page.trials) + "]";
-  if (page.parts > 1)
-    text += "\n[" + std::to_string(page.part) + " / " + std::to_string(page.parts) + "]";
-  if (page.picture) text += "\n[a picture, which the window shows]";
-  if (page.kind == kText && page.keys.empty()) text += "\n[space bar: go on]";
-  if (page.kind == Page::Kind::message && page.parts == 0 && page.typing == Page::Typing::none)
-    return text;  // nothing to answer now
-  if (!page.keys.empty() && page.kind != Page::Kind::neutral) text += "\n";
-  if (page.typing != Page::Typing::none) text += "\n> " + printable(page.typed);
-  for (const auto& [key, answer] : page.keys) {
-    text += text.empty() ? "" : "   ";
-    if (key == page.chosen) text += '*';
-    text += printable(key);
-    text += ' ';
-    text += printable(answer);
-  }
-  if (page.back) text += "\n[left arrow: back]";
-  return text;
-}
-
-std::string checklist_text(const Checklist& list) {
-  std::size_t due = 0;
-  while (due < list.steps.size() && list.steps[due].state != Checklist::Step::State::now) ++due;
-  std::string text = "* step " + std::to_string(due + 1) + " of " +
-                     std::to_string(list.steps.size()) + ": " + printable(list.instruction);
-  std::string choices;
-  for (const auto& [kind, meaning] : list.choices) {
-    choices += choices.empty() ? " (" : "; ";
-    choices += "':" + std::string(text_command(kind)) + "': " + meaning;
-  }
-  return text + choices + (choices.empty() ? "\n" : ")\n");
-}
-
-std::string status(const ConsoleState& state) {
-  std::string text = "[" + state.state;
-  if (state.practice && (state.state == "trial" || state.state == "homing")) text += ", practice";
-  if (state.trial > 0) {
-    text += ", block " + std::to_string(state.block) + " of " + std::to_string(state.blocks) +
-            ", trial " + trial_of(state);
-  }
-  if (state.remaining > 60)
-    text += ", " + std::to_string(static_cast<int>(state.remaining / 60)) + " min left";
-  if (state.missed_ticks > 0)
-    text += ", " + std::to_string(state.missed_ticks) +
-            (state.missed_ticks == 1 ? " tick missed" : " ticks missed");
-  if (!state.held_by.empty()) text += ": " + printable(state.held_by);
-  return text + "]\n";
-}
-
-}  // namespace
-
 void TextScreen::show(const Page& page) {
   const Page before = std::exchange(last_, page);
   std::string text;
@@ -323,122 +430,6 @@ void TextConsole::show(const ConsoleState& state) {
 std::string TextConsole::name_of(ConsoleCommand::Kind kind) const {
   return "':" + std::string(text_command(kind)) + "'";
 }
-
-namespace {
-
-using std::chrono::steady_clock;
-
-constexpr std::size_t kMaxWrite = 256;  // bytes; poll() promises that a terminal takes these
-constexpr auto kFlushTime = std::chrono::milliseconds(300);  // for the remaining text at the end
-
-class TextDisplay final : public DisplayLoop {
- public:
-  explicit TextDisplay(const TextSettings& settings) : settings_(settings) {
-    print(std::string("Text display: keys answer; ") + text_commands_help());
-  }
-
-  ParticipantScreen& participant() override { return screen_; }
-  ExperimenterConsole& console() override { return console_; }
-
-  void run() override {
-    try {
-      while (!ended_.load()) step(-1);
-    } catch (...) {
-      screen_.close();
-      throw;
-    }
-    const auto deadline = steady_clock::now() + kFlushTime;
-    collect();
-    while (!pending_.empty() && steady_clock::now() < deadline) step(20);
-  }
-
-  void end() noexcept override {
-    ended_ = true;
-    wake_.signal();
-  }
-
- private:
-  void print(const std::string& text) { out_.add({STDERR_FILENO, text}); }
-
-  void collect() {
-    for (Output& output : out_.take()) {
-      if (output.text.front() != '\r') {
-        output.text = wrapped(output.text, columns_of(output.file));
-        // Write a command that is being typed again below the new text.
-        if (terminal_.on() && !input_.line().empty())
-          output.text = "\r\x1b[K" + output.text + printable(input_.line());
-      }
-      pending_.push_back(std::move(output));
-    }
-  }
-
-  /// Waits for a key, for text to write, or until the output accepts it.
-  void step(int timeout_ms) {
-    collect();
-    std::array<pollfd, 3> files = {{{wake_.file(), POLLIN, 0},
-                                    {input_ended_ ? -1 : STDIN_FILENO, POLLIN, 0},
-                                    {pending_.empty() ? -1 : pending_.front().file, POLLOUT, 0}}};
-    if (poll(files.data(), files.size(), timeout_ms) < 0) return;  // a signal
-    if (files[0].revents != 0) wake_.clear();
-    if (files[1].revents != 0) read_input();
-    if (files[2].revents != 0) write_output();
-  }
-
-  void read_input() {
-    std::array<char, 512> bytes{};
-    const ssize_t got = read(STDIN_FILENO, bytes.data(), bytes.size());
-    const std::int64_t now = settings_.clock->now_ns();
-    if (got < 0 && (errno == EINTR || errno == EAGAIN)) return;
-    if (got <= 0) {
-      input_ended_ = true;
-      screen_.close();
-      return;
-    }
-    const std::string before = input_.line();
-    for (const TextInput::Event& event :
-         input_.feed({bytes.data(), static_cast<std::size_t>(got)}, now)) {
-      dispatch(event);
-    }
-    if (terminal_.on() && input_.line() != before) {
-      print("\r\x1b[K" + printable(input_.line()) + (input_.line().empty() ? "\n" : ""));
-    }
-  }
-
-  void dispatch(const TextInput::Event& event) {
-    if (const auto* press = std::get_if<KeyPress>(&event)) {
-      screen_.press(*press);
-    } else if (const auto* command = std::get_if<ConsoleCommand>(&event)) {
-      if (command->kind == ConsoleCommand::Kind::emergency_zero && settings_.emergency)
-        settings_.emergency();
-      console_.add_command(*command);
-    } else {
-      print(text_commands_help());
-    }
-  }
-
-  void write_output() {
-    Output& output = pending_.front();
-    const std::string_view now = std::string_view(output.text).substr(0, kMaxWrite);
-    const ssize_t written = write(output.file, now.data(), now.size());
-    if (written < 0 && (errno == EINTR || errno == EAGAIN)) return;
-    // Drop the text on an error (closed pipe).
-    output.text.erase(0, written < 0 ? output.text.size() : static_cast<std::size_t>(written));
-    if (output.text.empty()) pending_.pop_front();
-  }
-
-  const TextSettings settings_;
-  RawTerminal terminal_;
-  WakeEvent wake_;
-  EventQueue<Output> out_;
-  std::deque<Output> pending_;
-  TextScreen screen_{out_, wake_};
-  TextConsole console_{out_, wake_};
-  TextInput input_;
-  bool input_ended_ = false;
-  std::atomic<bool> ended_{false};
-};
-
-}  // namespace
 
 std::unique_ptr<DisplayLoop> make_text_display(const TextSettings& settings) {
   return std::make_unique<TextDisplay>(settings);

@@ -160,6 +160,81 @@ WindowLayout lay_out(const WindowSettings& settings, const Monitor& participant,
   return layout;
 }
 
+constexpr double kEvery = 0.1;          // s, between two checks of the windows' places
+constexpr double kEveryMonitors = 0.5;  // s, between two looks at the list of monitors
+constexpr double kSettling = 1.5;       // s, that the window manager has to show them
+constexpr double kFilling = 2.5;        // s, that it has to fill a monitor
+constexpr double kStill = 0.4;          // s without a move: it is not being dragged any more
+constexpr double kRaiseEvery = 0.5;
+constexpr int kTries = 3, kFillingTries = 7;
+
+constexpr const char* kFullScreenState = "_NET_WM_STATE_FULLSCREEN";
+
+/// Puts a window above the others. Unlike glfwFocusWindow it does not move the keyboard focus.
+void raise(GLFWwindow* window) {
+  if (Display* const display = glfwGetX11Display()) XRaiseWindow(display, glfwGetX11Window(window));
+}
+
+bool lists(const std::vector<unsigned long>& atoms, Atom atom) {
+  return std::find(atoms.begin(), atoms.end(), atom) != atoms.end();
+}
+
+/// Asks the window manager to set or end a state of a window, or two.
+void ask_for_state(GLFWwindow* window, bool set, const char* one, const char* other = nullptr) {
+  Display* const display = glfwGetX11Display();
+  if (display == nullptr) return;
+  const auto atom = [display](const char* name) {
+    return static_cast<long>(XInternAtom(display, name, False));
+  };
+  constexpr long kProgram = 1;
+  XEvent event{};
+  event.xclient.type = ClientMessage;
+  event.xclient.window = glfwGetX11Window(window);
+  event.xclient.message_type = static_cast<Atom>(atom("_NET_WM_STATE"));
+  event.xclient.format = 32;
+  event.xclient.data.l[0] = set ? 1 : 0;
+  event.xclient.data.l[1] = atom(one);
+  event.xclient.data.l[2] = other != nullptr ? atom(other) : 0;
+  event.xclient.data.l[3] = kProgram;
+  XSendEvent(display, DefaultRootWindow(display), False,
+             SubstructureNotifyMask | SubstructureRedirectMask, &event);
+}
+
+/// Ends a maximised or full-screen state set through the window manager.
+void restore(GLFWwindow* window) {
+  ask_for_state(window, false, kFullScreenState);
+  ask_for_state(window, false, "_NET_WM_STATE_MAXIMIZED_VERT", "_NET_WM_STATE_MAXIMIZED_HORZ");
+}
+
+/// Whether a window manager keeps full-screen windows above panels and others.
+bool manager_fills_screens() {
+  Display* const display = glfwGetX11Display();
+  if (display == nullptr) return false;
+  const Window root = DefaultRootWindow(display);
+  const auto manager = read_property(display, root, "_NET_SUPPORTING_WM_CHECK", XA_WINDOW);
+  if (manager.empty() ||
+      read_property(display, manager.front(), "_NET_SUPPORTING_WM_CHECK", XA_WINDOW).empty())
+    return false;  // none, or it was killed
+  return lists(read_property(display, root, "_NET_SUPPORTED", XA_ATOM),
+               XInternAtom(display, kFullScreenState, False));
+}
+
+bool is_full_screen(GLFWwindow* window) {
+  Display* const display = glfwGetX11Display();
+  return display != nullptr &&
+         lists(read_property(display, glfwGetX11Window(window), "_NET_WM_STATE", XA_ATOM),
+               XInternAtom(display, kFullScreenState, False));
+}
+
+bool on_one_monitor(const std::vector<Monitor>& all, const ScreenBox& a, const ScreenBox& b) {
+  const Monitor *one = monitor_of(all, a), *other = monitor_of(all, b);
+  return one == nullptr || other == nullptr || overlap(one->box, other->box);
+}
+
+bool same_monitors(const WindowLayout& a, const WindowLayout& b) {
+  return a.participant.monitor == b.participant.monitor && a.console.monitor == b.console.monitor;
+}
+
 }  // namespace
 
 std::string glfw_reason() {
@@ -260,85 +335,6 @@ GLFWwindow* make_window(const std::string& title, const WindowGeometry& geometry
   glfwSwapInterval(0);  // waiting for a vertical retrace would delay the keys of both windows
   return window;
 }
-
-namespace {
-
-constexpr double kEvery = 0.1;          // s, between two checks of the windows' places
-constexpr double kEveryMonitors = 0.5;  // s, between two looks at the list of monitors
-constexpr double kSettling = 1.5;       // s, that the window manager has to show them
-constexpr double kFilling = 2.5;        // s, that it has to fill a monitor
-constexpr double kStill = 0.4;          // s without a move: it is not being dragged any more
-constexpr double kRaiseEvery = 0.5;
-constexpr int kTries = 3, kFillingTries = 7;
-
-constexpr const char* kFullScreenState = "_NET_WM_STATE_FULLSCREEN";
-
-/// Puts a window above the others. Unlike glfwFocusWindow it does not move the keyboard focus.
-void raise(GLFWwindow* window) {
-  if (Display* const display = glfwGetX11Display()) XRaiseWindow(display, glfwGetX11Window(window));
-}
-
-bool lists(const std::vector<unsigned long>& atoms, Atom atom) {
-  return std::find(atoms.begin(), atoms.end(), atom) != atoms.end();
-}
-
-/// Asks the window manager to set or end a state of a window, or two.
-void ask_for_state(GLFWwindow* window, bool set, const char* one, const char* other = nullptr) {
-  Display* const display = glfwGetX11Display();
-  if (display == nullptr) return;
-  const auto atom = [display](const char* name) {
-    return static_cast<long>(XInternAtom(display, name, False));
-  };
-  constexpr long kProgram = 1;
-  XEvent event{};
-  event.xclient.type = ClientMessage;
-  event.xclient.window = glfwGetX11Window(window);
-  event.xclient.message_type = static_cast<Atom>(atom("_NET_WM_STATE"));
-  event.xclient.format = 32;
-  event.xclient.data.l[0] = set ? 1 : 0;
-  event.xclient.data.l[1] = atom(one);
-  event.xclient.data.l[2] = other != nullptr ? atom(other) : 0;
-  event.xclient.data.l[3] = kProgram;
-  XSendEvent(display, DefaultRootWindow(display), False,
-             SubstructureNotifyMask | SubstructureRedirectMask, &event);
-}
-
-/// Ends a maximised or full-screen state set through the window manager.
-void restore(GLFWwindow* window) {
-  ask_for_state(window, false, kFullScreenState);
-  ask_for_state(window, false, "_NET_WM_STATE_MAXIMIZED_VERT", "_NET_WM_STATE_MAXIMIZED_HORZ");
-}
-
-/// Whether a window manager keeps full-screen windows above panels and others.
-bool manager_fills_screens() {
-  Display* const display = glfwGetX11Display();
-  if (display == nullptr) return false;
-  const Window root = DefaultRootWindow(display);
-  const auto manager = read_property(display, root, "_NET_SUPPORTING_WM_CHECK", XA_WINDOW);
-  if (manager.empty() ||
-      read_property(display, manager.front(), "_NET_SUPPORTING_WM_CHECK", XA_WINDOW).empty())
-    return false;  // none, or it was killed
-  return lists(read_property(display, root, "_NET_SUPPORTED", XA_ATOM),
-               XInternAtom(display, kFullScreenState, False));
-}
-
-bool is_full_screen(GLFWwindow* window) {
-  Display* const display = glfwGetX11Display();
-  return display != nullptr &&
-         lists(read_property(display, glfwGetX11Window(window), "_NET_WM_STATE", XA_ATOM),
-               XInternAtom(display, kFullScreenState, False));
-}
-
-bool on_one_monitor(const std::vector<Monitor>& all, const ScreenBox& a, const ScreenBox& b) {
-  const Monitor *one = monitor_of(all, a), *other = monitor_of(all, b);
-  return one == nullptr || other == nullptr || overlap(one->box, other->box);
-}
-
-bool same_monitors(const WindowLayout& a, const WindowLayout& b) {
-  return a.participant.monitor == b.participant.monitor && a.console.monitor == b.console.monitor;
-}
-
-}  // namespace
 
 WindowPlacing::WindowPlacing(GLFWwindow* participant, GLFWwindow* console,
                              const WindowSettings& settings, const WindowLayout& layout)

@@ -31,6 +31,111 @@ constexpr std::int64_t kFeedback_ns = 1'000'000'000;
 constexpr std::int64_t kReply_ns = 2'000'000'000;
 constexpr std::int64_t kSteady_ns = 150'000'000;  // debounces the cue at the edge of the home zone
 
+using protocols::TaskKind;
+
+constexpr std::int64_t kAskPause_ns = 5'000'000;
+constexpr std::size_t kMostTyped = 200;          // bytes
+constexpr std::int64_t kBurst_ns = 400'000'000;  // keys of one number follow each other faster
+
+using NamedKeys = std::vector<std::pair<std::string, std::string>>;
+
+/// Keys of a page: 1, 2, ..., 9, 0, then letters, each with its text.
+NamedKeys numbered(const std::vector<std::string>& texts) {
+  NamedKeys keys;
+  keys.reserve(texts.size());
+  for (std::size_t i = 0; i < texts.size(); ++i) {
+    const std::string key = i < 9    ? std::to_string(i + 1)
+                            : i == 9 ? "0"
+                                     : std::string(1, static_cast<char>('a' + i - 10));
+    keys.emplace_back(key, texts[i]);
+  }
+  return keys;
+}
+
+std::vector<ReadScreen> screens_of_text(const std::string& text) {
+  std::vector<ReadScreen> screens(1);
+  for (const char c : text) {
+    if (c == '\f') {
+      screens.emplace_back();
+    } else {
+      screens.back().text += c;
+    }
+  }
+  return screens;
+}
+
+/// "(18 \u2013 120)", "(\u2265 0)"; in any language.
+std::string range_text(std::optional<double> least, std::optional<double> most) {
+  const auto text = [](double number) { return protocols::level_text(number); };
+  if (least && most) return " (" + text(*least) + " \u2013 " + text(*most) + ")";
+  if (least) return " (\u2265 " + text(*least) + ")";
+  return most ? " (\u2264 " + text(*most) + ")" : "";
+}
+
+std::string lower_case(std::string text) {
+  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c;
+  return text;
+}
+
+std::optional<double> number_in(const std::string& typed, std::optional<double> least,
+                                std::optional<double> most) {
+  double number = 0;
+  const char* const end = typed.data() + typed.size();
+  const auto [at, error] = std::from_chars(typed.data(), end, number);
+  if (error != std::errc{} || at != end || !std::isfinite(number)) return std::nullopt;
+  if ((least && number < *least) || (most && number > *most)) return std::nullopt;
+  return number + 0.0;  // -0 is 0
+}
+
+bool is_turn(const protocols::TaskBlock& block, const Answer& answer) {
+  if (block.task != TaskKind::adjust) return false;
+  const std::string& act = block.answers[static_cast<std::size_t>(answer.stimulus)].name;
+  return act == "up" || act == "down";
+}
+
+constexpr int kUsualBaud = 9600;
+constexpr std::array<std::pair<int, speed_t>, 9> kSpeeds = {{{1200, B1200},
+                                                             {2400, B2400},
+                                                             {4800, B4800},
+                                                             {9600, B9600},
+                                                             {19200, B19200},
+                                                             {38400, B38400},
+                                                             {57600, B57600},
+                                                             {115200, B115200},
+                                                             {230400, B230400}}};
+
+/// Path and speed of "PATH[:BAUD]".
+std::pair<std::string, speed_t> port_of(const std::string& name) {
+  const std::size_t colon = name.rfind(':');
+  int baud = kUsualBaud;
+  std::string path = name;
+  const std::size_t digits = name.find_first_not_of("0123456789", colon + 1);
+  if (colon != std::string::npos && colon + 1 < name.size() && digits == std::string::npos) {
+    if (std::from_chars(name.data() + colon + 1, name.data() + name.size(), baud).ec != std::errc())
+      baud = 0;
+    path = name.substr(0, colon);
+  }
+  const auto* const speed = std::find_if(kSpeeds.begin(), kSpeeds.end(),
+                                         [baud](const auto& one) { return one.first == baud; });
+  if (path.empty() || speed == kSpeeds.end())
+    throw std::invalid_argument("no serial port '" + name +
+                                "'; expected PATH[:BAUD] with a usual speed, such as 9600");
+  return {path, speed->second};
+}
+
+std::map<unsigned char, std::string> bytes_of(const std::map<std::string, std::string>& keys) {
+  std::map<unsigned char, std::string> bytes;
+  for (const auto& [input, key] : keys) {
+    unsigned value = static_cast<unsigned char>(input[0]);
+    if (input.size() == 4) std::from_chars(input.data() + 2, input.data() + 4, value, 16);
+    bytes[static_cast<unsigned char>(value)] = key;
+  }
+  for (unsigned char c = '!'; keys.empty() && c <= '~'; ++c)
+    bytes[c] = std::string(1, static_cast<char>(c));
+  if (keys.empty()) bytes[' '] = "space";
+  return bytes;
+}
+
 }  // namespace
 
 KeyboardRespondent::KeyboardRespondent(const protocols::Protocol& protocol,
@@ -261,72 +366,6 @@ std::optional<Answer> KeyboardRespondent::step(const servo::Sample& sample) {
 }
 
 // The part of KeyboardRespondent for version 2: intervals, typed numbers, confidence, pages.
-
-namespace {
-
-using protocols::TaskKind;
-
-constexpr std::int64_t kAskPause_ns = 5'000'000;
-constexpr std::size_t kMostTyped = 200;          // bytes
-constexpr std::int64_t kBurst_ns = 400'000'000;  // keys of one number follow each other faster
-
-using NamedKeys = std::vector<std::pair<std::string, std::string>>;
-
-/// Keys of a page: 1, 2, ..., 9, 0, then letters, each with its text.
-NamedKeys numbered(const std::vector<std::string>& texts) {
-  NamedKeys keys;
-  keys.reserve(texts.size());
-  for (std::size_t i = 0; i < texts.size(); ++i) {
-    const std::string key = i < 9    ? std::to_string(i + 1)
-                            : i == 9 ? "0"
-                                     : std::string(1, static_cast<char>('a' + i - 10));
-    keys.emplace_back(key, texts[i]);
-  }
-  return keys;
-}
-
-std::vector<ReadScreen> screens_of_text(const std::string& text) {
-  std::vector<ReadScreen> screens(1);
-  for (const char c : text) {
-    if (c == '\f') {
-      screens.emplace_back();
-    } else {
-      screens.back().text += c;
-    }
-  }
-  return screens;
-}
-
-/// "(18 \u2013 120)", "(\u2265 0)"; in any language.
-std::string range_text(std::optional<double> least, std::optional<double> most) {
-  const auto text = [](double number) { return protocols::level_text(number); };
-  if (least && most) return " (" + text(*least) + " \u2013 " + text(*most) + ")";
-  if (least) return " (\u2265 " + text(*least) + ")";
-  return most ? " (\u2264 " + text(*most) + ")" : "";
-}
-
-std::string lower_case(std::string text) {
-  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c;
-  return text;
-}
-
-std::optional<double> number_in(const std::string& typed, std::optional<double> least,
-                                std::optional<double> most) {
-  double number = 0;
-  const char* const end = typed.data() + typed.size();
-  const auto [at, error] = std::from_chars(typed.data(), end, number);
-  if (error != std::errc{} || at != end || !std::isfinite(number)) return std::nullopt;
-  if ((least && number < *least) || (most && number > *most)) return std::nullopt;
-  return number + 0.0;  // -0 is 0
-}
-
-bool is_turn(const protocols::TaskBlock& block, const Answer& answer) {
-  if (block.task != TaskKind::adjust) return false;
-  const std::string& act = block.answers[static_cast<std::size_t>(answer.stimulus)].name;
-  return act == "up" || act == "down";
-}
-
-}  // namespace
 
 std::optional<std::string> accepted_answer(const protocols::PageItem& item,
                                            const std::string& typed) {
@@ -707,53 +746,6 @@ std::optional<std::string> KeyboardRespondent::ask(const protocols::PageSpec& pa
   const bool choice = item.kind == Kind::choice || item.kind == Kind::scale;
   return choice ? ask_choice(item, how) : ask_typed(item, how);
 }
-
-namespace {
-
-constexpr int kUsualBaud = 9600;
-constexpr std::array<std::pair<int, speed_t>, 9> kSpeeds = {{{1200, B1200},
-                                                             {2400, B2400},
-                                                             {4800, B4800},
-                                                             {9600, B9600},
-                                                             {19200, B19200},
-                                                             {38400, B38400},
-                                                             {57600, B57600},
-                                                             {115200, B115200},
-                                                             {230400, B230400}}};
-
-/// Path and speed of "PATH[:BAUD]".
-std::pair<std::string, speed_t> port_of(const std::string& name) {
-  const std::size_t colon = name.rfind(':');
-  int baud = kUsualBaud;
-  std::string path = name;
-  const std::size_t digits = name.find_first_not_of("0123456789", colon + 1);
-  if (colon != std::string::npos && colon + 1 < name.size() && digits == std::string::npos) {
-    if (std::from_chars(name.data() + colon + 1, name.data() + name.size(), baud).ec != std::errc())
-      baud = 0;
-    path = name.substr(0, colon);
-  }
-  const auto* const speed = std::find_if(kSpeeds.begin(), kSpeeds.end(),
-                                         [baud](const auto& one) { return one.first == baud; });
-  if (path.empty() || speed == kSpeeds.end())
-    throw std::invalid_argument("no serial port '" + name +
-                                "'; expected PATH[:BAUD] with a usual speed, such as 9600");
-  return {path, speed->second};
-}
-
-std::map<unsigned char, std::string> bytes_of(const std::map<std::string, std::string>& keys) {
-  std::map<unsigned char, std::string> bytes;
-  for (const auto& [input, key] : keys) {
-    unsigned value = static_cast<unsigned char>(input[0]);
-    if (input.size() == 4) std::from_chars(input.data() + 2, input.data() + 4, value, 16);
-    bytes[static_cast<unsigned char>(value)] = key;
-  }
-  for (unsigned char c = '!'; keys.empty() && c <= '~'; ++c)
-    bytes[c] = std::string(1, static_cast<char>(c));
-  if (keys.empty()) bytes[' '] = "space";
-  return bytes;
-}
-
-}  // namespace
 
 ResponseBox::ResponseBox(const std::string& name, const std::map<std::string, std::string>& keys,
                          servo::Clock& clock, std::function<void()> emergency)

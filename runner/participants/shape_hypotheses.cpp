@@ -55,22 +55,6 @@ void add(const stimuli::ObjectSpec& spec, const Pose& parent, std::vector<Placed
   for (auto& mesh : meshes) out.push_back({std::move(mesh), pose});
 }
 
-}  // namespace
-
-bool can_be_felt(const stimuli::ObjectSpec& stimulus) {
-  if (stimulus.shape != stimuli::ShapeKind::compound)
-    return felt_depth(stimulus.material).has_value();
-  return std::any_of(stimulus.parts.begin(), stimulus.parts.end(), can_be_felt);
-}
-
-std::vector<PlacedPart> felt_parts(const stimuli::ObjectSpec& stimulus) {
-  std::vector<PlacedPart> parts;
-  add(stimulus, Pose{}, parts);
-  return parts;
-}
-
-namespace {
-
 constexpr int kFine = 9120;    // 11 degrees apart
 constexpr int kCoarse = 4608;  // 14 degrees; for objects with few symmetries
 constexpr int kFewSymmetries = 4;
@@ -128,81 +112,6 @@ std::vector<Vec3> samples(const DistanceField& field) {
   }
   return points;
 }
-
-}  // namespace
-
-Quat super_fibonacci(int i, int n) {
-  constexpr double kPsi = 1.533751168755204288118041;  // Alexa's constant: psi^4 = psi + 4
-  const double s = i + 0.5;
-  const double inner = std::sqrt(s / n);
-  const double outer = std::sqrt(1 - s / n);
-  const double alpha = 2 * std::numbers::pi * s / std::numbers::sqrt2;
-  const double beta = 2 * std::numbers::pi * s / kPsi;
-  return Quat(inner * std::sin(alpha), inner * std::cos(alpha), outer * std::sin(beta),
-              outer * std::cos(beta));
-}
-
-std::vector<Quat> symmetries(const std::vector<PlacedPart>& parts, const DistanceField& field) {
-  std::vector<Quat> found{Quat(1, 0, 0, 0)};
-  const std::vector<Vec3> points = samples(field);
-  // A sharp edge has an error of half a spacing, so single points may differ by a whole one.
-  const double most = field.spacing(), usual = field.spacing() / 5;
-  std::vector<float> before;
-  before.reserve(points.size());
-  for (const Vec3& point : points) before.push_back(distance_at(field, point));
-  const auto leaves_it = [&](const Quat& turn) {
-    double squares = 0;
-    for (std::size_t first = 0; first < points.size(); first += lane::kWidth) {
-      const std::size_t count = std::min<std::size_t>(lane::kWidth, points.size() - first);
-      lane::Floats x{}, y{}, z{};
-      for (std::size_t i = 0; i < count; ++i) {
-        const Vec3 turned = turn * points[first + i];
-        x[i] = static_cast<float>(turned.x);
-        y[i] = static_cast<float>(turned.y);
-        z[i] = static_cast<float>(turned.z);
-      }
-      const lane::Floats after = field.distances(x, y, z);
-      for (std::size_t i = 0; i < count; ++i) {
-        const double off = after[i] - before[first + i];
-        squares += off * off;
-        if (std::abs(off) > most) return false;
-      }
-    }
-    return squares <= usual * usual * static_cast<double>(points.size());
-  };
-  for (const Vec3& axis : possible_axes(parts, field.spacing())) {
-    if (found.size() > kMostSymmetries) break;  // nearly a sphere
-    for (int order = kHighestOrder; order > 1; --order) {
-      const double angle = 2 * std::numbers::pi / order;
-      if (!leaves_it(glm::angleAxis(angle, axis))) continue;
-      for (int k = 1; k < order; ++k) {
-        const Quat turn = glm::angleAxis(k * angle, axis);
-        const bool known = std::any_of(found.begin(), found.end(), [&](const Quat& other) {
-          return std::abs(glm::dot(turn, other)) > 1 - 1e-6;
-        });
-        if (!known) found.push_back(turn);
-      }
-      break;
-    }
-  }
-  return found;
-}
-
-std::vector<Mat3> distinct_rotations(const std::vector<Quat>& group) {
-  const int count = static_cast<int>(group.size()) < kFewSymmetries ? kCoarse : kFine;
-  std::vector<Mat3> rotations;
-  for (int i = 0; i < count; ++i) {
-    const Quat q = super_fibonacci(i, count);
-    const bool smallest = std::all_of(group.begin(), group.end(), [&](const Quat& symmetry) {
-      return std::abs((q * symmetry).w) <= std::abs(q.w) + 1e-12;
-    });
-    if (smallest) rotations.push_back(glm::mat3_cast(q));
-  }
-  if (rotations.empty()) rotations.emplace_back(1);
-  return rotations;
-}
-
-namespace {
 
 constexpr int kConeAxes = 380;
 constexpr int kCylinderAxes = 150;
@@ -275,6 +184,89 @@ bool has_formula(const stimuli::ObjectSpec& stimulus) {
 bool usable(double length) { return std::isfinite(length) && length > 0; }
 
 }  // namespace
+
+bool can_be_felt(const stimuli::ObjectSpec& stimulus) {
+  if (stimulus.shape != stimuli::ShapeKind::compound)
+    return felt_depth(stimulus.material).has_value();
+  return std::any_of(stimulus.parts.begin(), stimulus.parts.end(), can_be_felt);
+}
+
+std::vector<PlacedPart> felt_parts(const stimuli::ObjectSpec& stimulus) {
+  std::vector<PlacedPart> parts;
+  add(stimulus, Pose{}, parts);
+  return parts;
+}
+
+Quat super_fibonacci(int i, int n) {
+  constexpr double kPsi = 1.533751168755204288118041;  // Alexa's constant: psi^4 = psi + 4
+  const double s = i + 0.5;
+  const double inner = std::sqrt(s / n);
+  const double outer = std::sqrt(1 - s / n);
+  const double alpha = 2 * std::numbers::pi * s / std::numbers::sqrt2;
+  const double beta = 2 * std::numbers::pi * s / kPsi;
+  return Quat(inner * std::sin(alpha), inner * std::cos(alpha), outer * std::sin(beta),
+              outer * std::cos(beta));
+}
+
+std::vector<Quat> symmetries(const std::vector<PlacedPart>& parts, const DistanceField& field) {
+  std::vector<Quat> found{Quat(1, 0, 0, 0)};
+  const std::vector<Vec3> points = samples(field);
+  // A sharp edge has an error of half a spacing, so single points may differ by a whole one.
+  const double most = field.spacing(), usual = field.spacing() / 5;
+  std::vector<float> before;
+  before.reserve(points.size());
+  for (const Vec3& point : points) before.push_back(distance_at(field, point));
+  const auto leaves_it = [&](const Quat& turn) {
+    double squares = 0;
+    for (std::size_t first = 0; first < points.size(); first += lane::kWidth) {
+      const std::size_t count = std::min<std::size_t>(lane::kWidth, points.size() - first);
+      lane::Floats x{}, y{}, z{};
+      for (std::size_t i = 0; i < count; ++i) {
+        const Vec3 turned = turn * points[first + i];
+        x[i] = static_cast<float>(turned.x);
+        y[i] = static_cast<float>(turned.y);
+        z[i] = static_cast<float>(turned.z);
+      }
+      const lane::Floats after = field.distances(x, y, z);
+      for (std::size_t i = 0; i < count; ++i) {
+        const double off = after[i] - before[first + i];
+        squares += off * off;
+        if (std::abs(off) > most) return false;
+      }
+    }
+    return squares <= usual * usual * static_cast<double>(points.size());
+  };
+  for (const Vec3& axis : possible_axes(parts, field.spacing())) {
+    if (found.size() > kMostSymmetries) break;  // nearly a sphere
+    for (int order = kHighestOrder; order > 1; --order) {
+      const double angle = 2 * std::numbers::pi / order;
+      if (!leaves_it(glm::angleAxis(angle, axis))) continue;
+      for (int k = 1; k < order; ++k) {
+        const Quat turn = glm::angleAxis(k * angle, axis);
+        const bool known = std::any_of(found.begin(), found.end(), [&](const Quat& other) {
+          return std::abs(glm::dot(turn, other)) > 1 - 1e-6;
+        });
+        if (!known) found.push_back(turn);
+      }
+      break;
+    }
+  }
+  return found;
+}
+
+std::vector<Mat3> distinct_rotations(const std::vector<Quat>& group) {
+  const int count = static_cast<int>(group.size()) < kFewSymmetries ? kCoarse : kFine;
+  std::vector<Mat3> rotations;
+  for (int i = 0; i < count; ++i) {
+    const Quat q = super_fibonacci(i, count);
+    const bool smallest = std::all_of(group.begin(), group.end(), [&](const Quat& symmetry) {
+      return std::abs((q * symmetry).w) <= std::abs(q.w) + 1e-12;
+    });
+    if (smallest) rotations.push_back(glm::mat3_cast(q));
+  }
+  if (rotations.empty()) rotations.emplace_back(1);
+  return rotations;
+}
 
 std::string ShapeHypotheses::fault_of(const stimuli::ObjectSpec& stimulus) {
   const stimuli::ShapeTraits needs = stimuli::traits_of(stimulus.shape);

@@ -28,6 +28,43 @@ Vec3 random_perpendicular(Random& random, const Vec3& n) {
 
 Vec3 normal_vector(Random& random) { return {random.normal(), random.normal(), random.normal()}; }
 
+constexpr double kLongestWait = 60;  // s of simulated time, from the start of a trial to time zero
+
+/// Place of the grip while the device is at its centre, virtual frame, m. With a stylus that
+/// reaches farther, the hand stays near it.
+Vec3 hand_place(const WorkspaceMap& map) {
+  const Vec3 centre = map.to_virtual(Vec3(0));
+  return map.reach->in_world ? stretched(*map.reach, {centre, centre}).tip : centre;
+}
+
+bool is_far(const WorkspaceMap& map) { return map.reach && glm::length(hand_place(map)) > 1e-6; }
+
+/// Turns +z to `direction`, by the smallest rotation.
+Quat turn_up_to(const Vec3& direction) {
+  const Vec3 to = glm::normalize(direction), up(0, 0, 1);
+  const Vec3 axis = glm::cross(up, to);
+  const double w = 1 + glm::dot(up, to);
+  return w > 1e-9 ? glm::normalize(Quat(w, axis)) : Quat(0, 1, 0, 0);
+}
+
+/// Settings for a hand far from the object: it approaches from its own side, and leans the stylus
+/// as far as its workspace allows.
+SimulatedSettings as_far_hand(SimulatedSettings own, const protocols::Protocol& protocol) {
+  const WorkspaceMap map = workspace_of(protocol);
+  if (!is_far(map)) return own;
+  const double length = grip_from_virtual_tip(protocol);
+  const double radius =
+      own.device.workspace_radius * map.scale * (map.reach->in_world ? map.reach->factor : 1);
+  const double room =
+      radius - own.motor.approach_distance - std::abs(glm::length(hand_place(map)) - length);
+  constexpr double kLeast = 0.1;  // rad; the device itself stops at the end of its workspace
+  const double lean = 2 * std::asin(std::clamp(room / (2 * length), 0.0, 1.0));
+  own.motor.approach_min_rise =
+      std::max(own.motor.approach_min_rise, std::cos(std::max(lean, kLeast)));
+  own.stylus.tilt = own.stylus.tilt_sd = 0;
+  return own;
+}
+
 }  // namespace
 
 Explorer::Explorer(const SimulatedSettings& settings, double grip, double wall_stiffness,
@@ -208,47 +245,6 @@ void Explorer::limit_force(const Vec3& held) {
   const double length = std::sqrt(length2);
   if (length > max_offset_) tip_ -= (1 - max_offset_ / length) * offset;
 }
-
-namespace {
-
-constexpr double kLongestWait = 60;  // s of simulated time, from the start of a trial to time zero
-
-/// Place of the grip while the device is at its centre, virtual frame, m. With a stylus that
-/// reaches farther, the hand stays near it.
-Vec3 hand_place(const WorkspaceMap& map) {
-  const Vec3 centre = map.to_virtual(Vec3(0));
-  return map.reach->in_world ? stretched(*map.reach, {centre, centre}).tip : centre;
-}
-
-bool is_far(const WorkspaceMap& map) { return map.reach && glm::length(hand_place(map)) > 1e-6; }
-
-/// Turns +z to `direction`, by the smallest rotation.
-Quat turn_up_to(const Vec3& direction) {
-  const Vec3 to = glm::normalize(direction), up(0, 0, 1);
-  const Vec3 axis = glm::cross(up, to);
-  const double w = 1 + glm::dot(up, to);
-  return w > 1e-9 ? glm::normalize(Quat(w, axis)) : Quat(0, 1, 0, 0);
-}
-
-/// Settings for a hand far from the object: it approaches from its own side, and leans the stylus
-/// as far as its workspace allows.
-SimulatedSettings as_far_hand(SimulatedSettings own, const protocols::Protocol& protocol) {
-  const WorkspaceMap map = workspace_of(protocol);
-  if (!is_far(map)) return own;
-  const double length = grip_from_virtual_tip(protocol);
-  const double radius =
-      own.device.workspace_radius * map.scale * (map.reach->in_world ? map.reach->factor : 1);
-  const double room =
-      radius - own.motor.approach_distance - std::abs(glm::length(hand_place(map)) - length);
-  constexpr double kLeast = 0.1;  // rad; the device itself stops at the end of its workspace
-  const double lean = 2 * std::asin(std::clamp(room / (2 * length), 0.0, 1.0));
-  own.motor.approach_min_rise =
-      std::max(own.motor.approach_min_rise, std::cos(std::max(lean, kLeast)));
-  own.stylus.tilt = own.stylus.tilt_sd = 0;
-  return own;
-}
-
-}  // namespace
 
 SimulatedParticipant::SimulatedParticipant(const SimulatedSettings& own,
                                            const ShapeHypotheses& hypotheses,

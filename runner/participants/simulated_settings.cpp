@@ -19,15 +19,13 @@
 #include "protocols/parse.h"
 
 namespace palpate::runner::participants {
-
-// Ranges of the simulated participant's numbers: physically possible hands, styli and devices, and
-// the domain of the model. The ranges are wide; plausible values are up to the study.
-
-/// The range that a value violates, as "must be ..."; empty: it is valid, or has no range.
-/// \param pointer  JSON pointer into the complete settings, "/hand/mass_kg"
-std::string range_fault(const std::string& pointer, double value);
-
 namespace {
+
+using nlohmann::json;
+
+int whole(const json& value) {
+  return static_cast<int>(std::lround(std::clamp(value.get<double>(), -1e9, 1e9)));
+}
 
 enum class Kind { from_least, above_least, within, whole };
 
@@ -133,8 +131,8 @@ const char* words_of(Kind kind) {
   return "";
 }
 
-}  // namespace
-
+// Ranges of the simulated participant's numbers: physically possible hands, styli and devices, and
+// the domain of the model. The ranges are wide; plausible values are up to the study.
 std::string range_fault(const std::string& pointer, double value) {
   const auto* const range = std::find_if(kRanges.begin(), kRanges.end(),
                                          [&](const Range& one) { return one.pointer == pointer; });
@@ -143,10 +141,6 @@ std::string range_fault(const std::string& pointer, double value) {
   std::snprintf(text, sizeof text, words_of(range->kind), range->least, range->most);
   return text;
 }
-
-namespace {
-
-using nlohmann::json;
 
 // Version 3 has every key. These are the values that describe earlier versions.
 const char* const kBeforeVersion3 = R"({
@@ -187,28 +181,6 @@ json implied_settings(int version) {
   }
   return implied;
 }
-
-}  // namespace
-
-std::string setting_fault(const std::string& pointer, const json& value, const json& now) {
-  if (now.is_number() && !(value.is_number() && std::isfinite(value.get<double>())))
-    return "must be a number";
-  if (now.is_number()) return range_fault(pointer, value.get<double>());
-  if (now.is_boolean() && !value.is_boolean()) return "must be true or false";
-  const auto known = words().find(pointer);
-  if (known != words().end()) {
-    std::string list;
-    for (const std::string& word : known->second) {
-      if (value == word) return "";
-      list += (list.empty() ? "" : " or ") + word;
-    }
-    return "must be " + list;
-  }
-  if (now.is_string() && !value.is_string()) return "must be a text";
-  return "";
-}
-
-namespace {
 
 struct Check {
   std::string file;
@@ -257,45 +229,7 @@ void remove_implied(json& settings, const json& implied) {
   }
 }
 
-}  // namespace
-
-json complete_settings(int version) {
-  const json frozen = frozen_settings(version);
-  json settings = implied_settings(version);
-  settings.merge_patch(frozen);
-  return settings;
-}
-
-void patch_settings(json& settings, const std::string& path) {
-  protocols::FaultList found(path);
-  const json patch = protocols::read_json(protocols::read_text_file(path), found);
-  found.throw_if_any();
-  Check check{path, false};
-  check.compare(patch, settings, "");
-  check.throw_if_any();
-  settings.merge_patch(patch);
-}
-
-void check_settings(const json& settings) {
-  Check check{"settings of the simulated participant", true};
-  check.compare(settings, complete_settings(3), "");
-  check.throw_if_any();
-}
-
-std::string settings_checksum(json settings) {
-  remove_implied(settings, implied_settings(settings.at("version")));
-  return checksum_hex(settings.dump());
-}
-
-namespace {
-
-using nlohmann::json;
-
 double degrees(const json& value) { return value.get<double>() * std::numbers::pi / 180; }
-
-int whole(const json& value) {
-  return static_cast<int>(std::lround(std::clamp(value.get<double>(), -1e9, 1e9)));
-}
 
 HeadingSettings read_heading(const json& heading) {
   HeadingSettings s;
@@ -370,6 +304,52 @@ json patched_settings(const std::string& patch_path, int version) {
 }
 
 }  // namespace
+
+std::string setting_fault(const std::string& pointer, const json& value, const json& now) {
+  if (now.is_number() && !(value.is_number() && std::isfinite(value.get<double>())))
+    return "must be a number";
+  if (now.is_number()) return range_fault(pointer, value.get<double>());
+  if (now.is_boolean() && !value.is_boolean()) return "must be true or false";
+  const auto known = words().find(pointer);
+  if (known != words().end()) {
+    std::string list;
+    for (const std::string& word : known->second) {
+      if (value == word) return "";
+      list += (list.empty() ? "" : " or ") + word;
+    }
+    return "must be " + list;
+  }
+  if (now.is_string() && !value.is_string()) return "must be a text";
+  return "";
+}
+
+json complete_settings(int version) {
+  const json frozen = frozen_settings(version);
+  json settings = implied_settings(version);
+  settings.merge_patch(frozen);
+  return settings;
+}
+
+void patch_settings(json& settings, const std::string& path) {
+  protocols::FaultList found(path);
+  const json patch = protocols::read_json(protocols::read_text_file(path), found);
+  found.throw_if_any();
+  Check check{path, false};
+  check.compare(patch, settings, "");
+  check.throw_if_any();
+  settings.merge_patch(patch);
+}
+
+void check_settings(const json& settings) {
+  Check check{"settings of the simulated participant", true};
+  check.compare(settings, complete_settings(3), "");
+  check.throw_if_any();
+}
+
+std::string settings_checksum(json settings) {
+  remove_implied(settings, implied_settings(settings.at("version")));
+  return checksum_hex(settings.dump());
+}
 
 std::vector<int> participant_versions() {
   std::vector<int> versions;

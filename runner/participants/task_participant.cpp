@@ -51,6 +51,35 @@ bool is_length(const std::string& pointer) {
   return pointer.ends_with("_m") || pointer.find("_m/") != std::string::npos;
 }
 
+constexpr double kLook = 1.5;       // s of exploration in each interval after the first contact
+constexpr double kLongestLook = 8;  // s, also without contact
+constexpr std::uint64_t kJudgement = 9;  // random stream; the hand has 1 to 3
+constexpr std::uint64_t kPages = 10;     // likewise
+constexpr int kMostIntervals = 64;       // trials of the hand within one of the session
+
+/// Whether the observer of shapes can identify a block's stimuli.
+bool is_identified_by_shape(const protocols::Protocol& protocol,
+                            const protocols::TaskBlock& block) {
+  if (block.task != protocols::TaskKind::identify || block.level) return false;
+  for (std::size_t i = 0; i < block.stimuli.size(); ++i) {
+    const auto object = [&](std::size_t k) -> const stimuli::ObjectSpec& {
+      return protocol.stimuli[static_cast<std::size_t>(block.stimuli[k])].object;
+    };
+    if (!ShapeHypotheses::fault_of(object(i)).empty()) return false;
+    for (std::size_t k = 0; k < i; ++k) {
+      if (have_one_form(object(i), object(k))) return false;
+    }
+  }
+  return true;
+}
+
+/// FNV-1a hash, for seeds.
+std::uint64_t number_of(const std::string& name) {
+  std::uint64_t hash = 14695981039346656037U;
+  for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211U;
+  return hash;
+}
+
 }  // namespace
 
 bool have_one_form(const stimuli::ObjectSpec& a, const stimuli::ObjectSpec& b) {
@@ -302,39 +331,6 @@ int TaskJudgement::confidence(int steps) const {
   const double share = std::min(evidence_ / 2, 0.999);
   return static_cast<int>(share * steps);
 }
-
-namespace {
-
-constexpr double kLook = 1.5;       // s of exploration in each interval after the first contact
-constexpr double kLongestLook = 8;  // s, also without contact
-constexpr std::uint64_t kJudgement = 9;  // random stream; the hand has 1 to 3
-constexpr std::uint64_t kPages = 10;     // likewise
-constexpr int kMostIntervals = 64;       // trials of the hand within one of the session
-
-/// Whether the observer of shapes can identify a block's stimuli.
-bool is_identified_by_shape(const protocols::Protocol& protocol,
-                            const protocols::TaskBlock& block) {
-  if (block.task != protocols::TaskKind::identify || block.level) return false;
-  for (std::size_t i = 0; i < block.stimuli.size(); ++i) {
-    const auto object = [&](std::size_t k) -> const stimuli::ObjectSpec& {
-      return protocol.stimuli[static_cast<std::size_t>(block.stimuli[k])].object;
-    };
-    if (!ShapeHypotheses::fault_of(object(i)).empty()) return false;
-    for (std::size_t k = 0; k < i; ++k) {
-      if (have_one_form(object(i), object(k))) return false;
-    }
-  }
-  return true;
-}
-
-/// FNV-1a hash, for seeds.
-std::uint64_t number_of(const std::string& name) {
-  std::uint64_t hash = 14695981039346656037U;
-  for (const char c : name) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211U;
-  return hash;
-}
-
-}  // namespace
 
 BlockHypotheses block_hypotheses(const protocols::Protocol& protocol) {
   BlockHypotheses all;

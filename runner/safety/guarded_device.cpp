@@ -31,60 +31,6 @@ void keep(std::array<char, kSize>& to, const std::string& from) {
   std::copy_n(from.begin(), std::min(from.size(), kSize - 1), to.begin());
 }
 
-}  // namespace
-
-GuardedReading::GuardedReading(const servo::DeviceReading& from, std::uint32_t request_,
-                               std::uint32_t trips_)
-    : tip_and_tail{from.stylus.tip.x,  from.stylus.tip.y,  from.stylus.tip.z,
-                   from.stylus.tail.x, from.stylus.tail.y, from.stylus.tail.z},
-      request(request_),
-      trips(trips_),
-      buttons(from.buttons),
-      lost(from.lost),
-      trouble(from.trouble) {}
-
-servo::DeviceReading GuardedReading::reading() const {
-  const auto& p = tip_and_tail;
-  return {{{p[0], p[1], p[2]}, {p[3], p[4], p[5]}}, buttons, lost, trouble};
-}
-
-servo::DeviceCapabilities FixedCapabilities::numbers() const {
-  return {name.data(),        sensed_freedom,   actuated_freedom, max_force, max_stiffness,
-          max_rate,           workspace_radius, resolution,       simulated, serial.data(),
-          calibration.data(), damping,          friction,         any_rate,  max_torque};
-}
-
-void FixedCapabilities::set(const servo::DeviceCapabilities& from) {
-  keep(name, from.name);
-  keep(serial, from.serial);
-  keep(calibration, from.calibration);
-  sensed_freedom = from.sensed_freedom;
-  actuated_freedom = from.actuated_freedom;
-  max_force = from.max_force;
-  max_stiffness = from.max_stiffness;
-  max_rate = from.max_rate;
-  workspace_radius = from.workspace_radius;
-  resolution = from.resolution;
-  damping = from.damping;
-  friction = from.friction;
-  simulated = from.simulated;
-  any_rate = from.any_rate;
-  max_torque = from.max_torque;
-}
-
-void futex_wait(const std::atomic<std::uint32_t>& word, std::uint32_t value,
-                std::int64_t for_ns) noexcept {
-  if (for_ns <= 0) return;
-  const timespec time{for_ns / kNsPerSecond, for_ns % kNsPerSecond};
-  syscall(SYS_futex, &word, FUTEX_WAIT, value, &time, nullptr, 0);
-}
-
-void futex_wake(const std::atomic<std::uint32_t>& word) noexcept {
-  syscall(SYS_futex, &word, FUTEX_WAKE, 1, nullptr, nullptr, 0);
-}
-
-namespace {
-
 constexpr std::int64_t kZeroEvery_ns = 1'000'000;  // while the runner is silent
 constexpr std::int64_t kSpin_ns = 20'000;  // busy wait: the command soon follows its reading
 
@@ -226,7 +172,62 @@ void fail(GuardChannel& channel, const char* message) {
   channel.state.store(GuardState::failed);
 }
 
+constexpr std::int64_t kReadingSpin_ns = 20'000;  // before sleeping for the reading
+constexpr int kUnanswered = 25;  // unanswered reads in a row after which forces go off
+constexpr auto kAnswerNap = std::chrono::milliseconds(2);
+constexpr auto kFarewell = std::chrono::seconds(2);  // for the guard to close the device
+
 }  // namespace
+
+GuardedReading::GuardedReading(const servo::DeviceReading& from, std::uint32_t request_,
+                               std::uint32_t trips_)
+    : tip_and_tail{from.stylus.tip.x,  from.stylus.tip.y,  from.stylus.tip.z,
+                   from.stylus.tail.x, from.stylus.tail.y, from.stylus.tail.z},
+      request(request_),
+      trips(trips_),
+      buttons(from.buttons),
+      lost(from.lost),
+      trouble(from.trouble) {}
+
+servo::DeviceReading GuardedReading::reading() const {
+  const auto& p = tip_and_tail;
+  return {{{p[0], p[1], p[2]}, {p[3], p[4], p[5]}}, buttons, lost, trouble};
+}
+
+servo::DeviceCapabilities FixedCapabilities::numbers() const {
+  return {name.data(),        sensed_freedom,   actuated_freedom, max_force, max_stiffness,
+          max_rate,           workspace_radius, resolution,       simulated, serial.data(),
+          calibration.data(), damping,          friction,         any_rate,  max_torque};
+}
+
+void FixedCapabilities::set(const servo::DeviceCapabilities& from) {
+  keep(name, from.name);
+  keep(serial, from.serial);
+  keep(calibration, from.calibration);
+  sensed_freedom = from.sensed_freedom;
+  actuated_freedom = from.actuated_freedom;
+  max_force = from.max_force;
+  max_stiffness = from.max_stiffness;
+  max_rate = from.max_rate;
+  workspace_radius = from.workspace_radius;
+  resolution = from.resolution;
+  damping = from.damping;
+  friction = from.friction;
+  simulated = from.simulated;
+  any_rate = from.any_rate;
+  max_torque = from.max_torque;
+}
+
+void futex_wait(const std::atomic<std::uint32_t>& word, std::uint32_t value,
+                std::int64_t for_ns) noexcept {
+  if (for_ns <= 0) return;
+  const timespec time{for_ns / kNsPerSecond, for_ns % kNsPerSecond};
+  syscall(SYS_futex, &word, FUTEX_WAIT, value, &time, nullptr, 0);
+}
+
+void futex_wake(const std::atomic<std::uint32_t>& word) noexcept {
+  syscall(SYS_futex, &word, FUTEX_WAKE, 1, nullptr, nullptr, 0);
+}
 
 void run_guard(GuardChannel& channel, const DeviceFactory& factory, const GuardSettings& settings,
                int runner) noexcept {
@@ -251,15 +252,6 @@ void run_guard(GuardChannel& channel, const DeviceFactory& factory, const GuardS
   }
   channel.state.store(GuardState::ended);
 }
-
-namespace {
-
-constexpr std::int64_t kReadingSpin_ns = 20'000;  // before sleeping for the reading
-constexpr int kUnanswered = 25;  // unanswered reads in a row after which forces go off
-constexpr auto kAnswerNap = std::chrono::milliseconds(2);
-constexpr auto kFarewell = std::chrono::seconds(2);  // for the guard to close the device
-
-}  // namespace
 
 GuardedDevice::GuardedDevice(const DeviceFactory& factory, const GuardSettings& settings)
     : settings_(settings) {

@@ -67,38 +67,6 @@ class CommandCheck {
   Vec3 last1_, last2_;
 };
 
-}  // namespace
-
-ForceDirectionCheck::ForceDirectionCheck(const servo::ForceLimits& limits, int driven)
-    : limits_(limits), force_(std::min(1.0, 0.5 * limits.max_force)), both_ends_(driven >= 5) {}
-
-rendering::Rendering ForceDirectionCheck::tick(const rendering::Scene&, rendering::RenderState&,
-                                               const rendering::LineProbe& probe,
-                                               double) const noexcept {
-  rendering::Rendering out;
-  out.device1 = Vec3(force_, 0, 0);
-  if (both_ends_) out.device2 = out.device1;
-  out.force = out.device1 + out.device2;
-  out.ideal = probe;
-  return out;
-}
-
-std::string ForceDirectionCheck::push(servo::TickSource& servo,
-                                      const std::function<bool()>& stop) const {
-  const rendering::Scene nothing({}, false);
-  constexpr servo::HomeZone kAnywhere{0, 0};
-  CommandCheck check(*this);
-  std::string fault;
-  servo.prepare(nothing, *this, kAnywhere);
-  while (fault.empty() && !check.over()) {
-    fault = stop() ? "it was stopped" : check.check(servo.next());
-  }
-  servo.stop();
-  return fault.empty() ? check.verdict() : fault;
-}
-
-namespace {
-
 constexpr double kSecond = 1e9, kDay = 86400 * kSecond, kYear = 365.25 * kDay;  // ns
 // 2024-01-01, earlier than this program: a computer without a battery starts with such a date.
 constexpr std::int64_t kBeforeThisProgram_ns = 1'704'067'200'000'000'000;
@@ -122,36 +90,6 @@ std::string day_and_minute(std::int64_t ns) {
   text[10] = ' ';
   return text + " UTC";
 }
-
-}  // namespace
-
-std::string clock_warning(const ClockEvidence& evidence) {
-  const std::int64_t now = evidence.now_ns;
-  const auto doubt = [now](const std::string& why) {
-    return "the computer's clock says " + day_and_minute(now) + ", " + why +
-           "; every date on record follows it: if it is wrong, end here and set it (timedatectl)";
-  };
-  // As doubles: the difference of two dates of a damaged file may overflow an integer.
-  const auto ahead = [now](std::int64_t then) {
-    return static_cast<double>(now) - static_cast<double>(then);
-  };
-  if (const auto& record = evidence.newest_record_ns) {
-    const std::string of = "the newest record of this database (" + day_and_minute(*record) + ")";
-    if (ahead(*record) < -kRecordSlack) return doubt(span(-ahead(*record)) + " before " + of);
-    if (ahead(*record) > kStudyRests) return doubt(span(ahead(*record)) + " after " + of);
-  }
-  if (now < kBeforeThisProgram_ns) return doubt("which is before this program existed");
-  if (const auto& file = evidence.newest_file_ns) {
-    const std::string of =
-        "the protocol or the program was written last (" + day_and_minute(*file) + ")";
-    if (ahead(*file) < -kFileSlack) return doubt(span(-ahead(*file)) + " before " + of);
-    if (!evidence.newest_record_ns && ahead(*file) > kProtocolRests)
-      return doubt(span(ahead(*file)) + " after " + of);
-  }
-  return "";
-}
-
-namespace {
 
 using Json = nlohmann::ordered_json;
 constexpr const char* kLimitedEvent = "material_limited";
@@ -337,6 +275,60 @@ class StimulusFaults {
 };
 
 }  // namespace
+
+ForceDirectionCheck::ForceDirectionCheck(const servo::ForceLimits& limits, int driven)
+    : limits_(limits), force_(std::min(1.0, 0.5 * limits.max_force)), both_ends_(driven >= 5) {}
+
+rendering::Rendering ForceDirectionCheck::tick(const rendering::Scene&, rendering::RenderState&,
+                                               const rendering::LineProbe& probe,
+                                               double) const noexcept {
+  rendering::Rendering out;
+  out.device1 = Vec3(force_, 0, 0);
+  if (both_ends_) out.device2 = out.device1;
+  out.force = out.device1 + out.device2;
+  out.ideal = probe;
+  return out;
+}
+
+std::string ForceDirectionCheck::push(servo::TickSource& servo,
+                                      const std::function<bool()>& stop) const {
+  const rendering::Scene nothing({}, false);
+  constexpr servo::HomeZone kAnywhere{0, 0};
+  CommandCheck check(*this);
+  std::string fault;
+  servo.prepare(nothing, *this, kAnywhere);
+  while (fault.empty() && !check.over()) {
+    fault = stop() ? "it was stopped" : check.check(servo.next());
+  }
+  servo.stop();
+  return fault.empty() ? check.verdict() : fault;
+}
+
+std::string clock_warning(const ClockEvidence& evidence) {
+  const std::int64_t now = evidence.now_ns;
+  const auto doubt = [now](const std::string& why) {
+    return "the computer's clock says " + day_and_minute(now) + ", " + why +
+           "; every date on record follows it: if it is wrong, end here and set it (timedatectl)";
+  };
+  // As doubles: the difference of two dates of a damaged file may overflow an integer.
+  const auto ahead = [now](std::int64_t then) {
+    return static_cast<double>(now) - static_cast<double>(then);
+  };
+  if (const auto& record = evidence.newest_record_ns) {
+    const std::string of = "the newest record of this database (" + day_and_minute(*record) + ")";
+    if (ahead(*record) < -kRecordSlack) return doubt(span(-ahead(*record)) + " before " + of);
+    if (ahead(*record) > kStudyRests) return doubt(span(ahead(*record)) + " after " + of);
+  }
+  if (now < kBeforeThisProgram_ns) return doubt("which is before this program existed");
+  if (const auto& file = evidence.newest_file_ns) {
+    const std::string of =
+        "the protocol or the program was written last (" + day_and_minute(*file) + ")";
+    if (ahead(*file) < -kFileSlack) return doubt(span(-ahead(*file)) + " before " + of);
+    if (!evidence.newest_record_ns && ahead(*file) > kProtocolRests)
+      return doubt(span(ahead(*file)) + " after " + of);
+  }
+  return "";
+}
 
 double felt_gain(const protocols::Protocol& protocol) {
   const WorkspaceMap map = workspace_of(protocol);

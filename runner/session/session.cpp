@@ -61,6 +61,34 @@ std::vector<participants::ReadScreen> screens_of(
   return screens;
 }
 
+std::vector<PageItem> questions_of(const PageSpec& page) {
+  if (page.kind != PageSpec::Kind::consent) return page.items;
+  PageItem agree;
+  agree.name = "consent";
+  return {agree};
+}
+
+std::optional<std::string> answer_to(const PageSpec& page, const PageItem& item,
+                                     const std::vector<data::PageAnswer>& answers) {
+  for (const data::PageAnswer& one : answers) {
+    if (one.page == page.name && one.item == item.name) return one.answer;
+  }
+  return std::nullopt;
+}
+
+/// The questions of a page without an answer, as indices.
+std::vector<std::size_t> open_questions(const PageSpec& page,
+                                        const std::vector<data::PageAnswer>& answers) {
+  std::vector<std::size_t> open;
+  const std::vector<PageItem> items = questions_of(page);
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    if (!answer_to(page, items[i], answers)) open.push_back(i);
+  }
+  return open;
+}
+
+std::array<double, 3> values(const Vec3& v) { return {v.x, v.y, v.z}; }
+
 }  // namespace
 
 const protocols::TaskBlock& Session::task_of(const protocols::Trial& trial) const {
@@ -316,36 +344,6 @@ void Session::resume_task_block() {
   if (block != nullptr && !station_.plan.block_begins()) read_instructions(*block);
 }
 
-namespace {
-
-std::vector<PageItem> questions_of(const PageSpec& page) {
-  if (page.kind != PageSpec::Kind::consent) return page.items;
-  PageItem agree;
-  agree.name = "consent";
-  return {agree};
-}
-
-std::optional<std::string> answer_to(const PageSpec& page, const PageItem& item,
-                                     const std::vector<data::PageAnswer>& answers) {
-  for (const data::PageAnswer& one : answers) {
-    if (one.page == page.name && one.item == item.name) return one.answer;
-  }
-  return std::nullopt;
-}
-
-/// The questions of a page without an answer, as indices.
-std::vector<std::size_t> open_questions(const PageSpec& page,
-                                        const std::vector<data::PageAnswer>& answers) {
-  std::vector<std::size_t> open;
-  const std::vector<PageItem> items = questions_of(page);
-  for (std::size_t i = 0; i < items.size(); ++i) {
-    if (!answer_to(page, items[i], answers)) open.push_back(i);
-  }
-  return open;
-}
-
-}  // namespace
-
 bool Session::has_open_pages() const {
   const auto& pages = station_.protocol.pages;
   return std::any_of(pages.begin(), pages.end(), [this](const PageSpec& page) {
@@ -403,12 +401,6 @@ void Session::store_answer(const PageSpec& page, const PageItem& item, const std
 void Session::tell_page(const PageView& view) {
   if (events_ != nullptr) events_->page(view);
 }
-
-namespace {
-
-std::array<double, 3> values(const Vec3& v) { return {v.x, v.y, v.z}; }
-
-}  // namespace
 
 Session::Session(const Station& station, participants::Respondent& participant,
                  SessionEvents* events, double least_reach)

@@ -51,88 +51,6 @@ class VisitingLog final : public TrialLog {
   std::function<void(const data::TrialRecord&)> visit_;
 };
 
-}  // namespace
-
-SimulatedStudy::SimulatedStudy(const protocols::Protocol& p,
-                               const participants::SimulatedSettings& s, std::uint64_t seed_)
-    : protocol(p),
-      settings(s),
-      library(p),
-      hypotheses(shapes_of(checked(p, library, s))),
-      of_blocks(participants::block_hypotheses(p)),
-      seed(seed_) {}
-
-void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& session,
-                           TrialLog& log, const std::function<bool()>& halting) {
-  const protocols::Protocol& protocol = study.protocol;
-  const participants::SimulatedSettings own =
-      participants::individual(study.settings, study.seed, session.participant);
-  devices::SimulatedStylus stylus(own.device, own.hand, protocol.stylus.length,
-                                  protocol.stylus.grip, 1 / protocol.servo_rate);
-  servo::VirtualClock clock(session.clock_ns);
-  servo::Servo servo(stylus, clock, protocol.servo_rate, servo::ForceLimits{},
-                     workspace_of(protocol));
-  if (protocol.passivity_controller) servo.control_passivity();
-  std::unique_ptr<participants::Respondent> participant;
-  if (!protocol.blocks.empty()) {
-    participant = std::make_unique<participants::TaskParticipant>(
-        own, study.hypotheses, study.of_blocks, stylus, protocol, study.seed, session.participant);
-  } else {
-    participant = std::make_unique<participants::SimulatedParticipant>(
-        own, study.hypotheses, stylus, protocol, study.seed, session.participant);
-  }
-  const Station station{protocol, study.library, session.plan, servo,
-                        clock,    session.utc,   log,          session.advisor};
-  Session trials(station, *participant);
-  // A shown trial is recorded, even if the run stops after it.
-  while (trials.state() != Session::State::end &&
-         (trials.state() == Session::State::response || !halting())) {
-    trials.step();
-  }
-}
-
-data::RunInfo simulated_run(const protocols::Protocol& protocol,
-                            const participants::SimulatedSettings& settings, int participant,
-                            int session) {
-  constexpr std::int64_t kDay_ns = 86'400'000'000'000;
-  constexpr std::int64_t kFirstMorning_ns = 946'717'200'000'000'000;  // 2000-01-01T09:00:00Z
-  const std::int64_t day =
-      (participant - 1) * static_cast<std::int64_t>(protocol.sessions.count) + session - 1;
-  data::RunInfo info;
-  info.session = session;
-  info.clock = {kFirstMorning_ns + day * kDay_ns, 0};
-  info.program_version = PALPATE_VERSION;
-  info.build = build_description();
-  info.device = "simulated";
-  info.response_device = "simulated";
-  info.response_latency = 0;
-  info.observer_sha256 = settings.sha256;
-  return info;
-}
-
-bool simulate_in_memory(
-    const protocols::Protocol& protocol, const participants::SimulatedSettings& settings,
-    int participants, std::uint64_t seed, const std::atomic<bool>& stop,
-    const std::function<void(int, const data::TrialRecord&, std::uint64_t)>& visit) {
-  const SimulatedStudy study(protocol, settings, seed);
-  for (int number = 1; number <= participants; ++number) {
-    for (int session = 1; session <= protocol.sessions.count; ++session) {
-      VisitingLog log([&](const data::TrialRecord& record) {
-        const double ticks = *record.contact_share * static_cast<double>(record.ticks);
-        visit(number, record, static_cast<std::uint64_t>(std::llround(ticks)));
-      });
-      run_simulated_session(study,
-                            {number, SessionPlan(protocol, number, session), 0,
-                             simulated_run(protocol, settings, number, session).clock},
-                            log, [&stop] { return stop.load(); });
-      if (stop) return false;
-    }
-  }
-  return true;
-}
-
-namespace {
-
 /// One session of one participant, with its records in the store.
 struct Work {
   data::Participant participant;
@@ -387,6 +305,84 @@ devices::SimulatedStylus simulated_stylus(const protocols::Protocol& protocol,
 }
 
 }  // namespace
+
+SimulatedStudy::SimulatedStudy(const protocols::Protocol& p,
+                               const participants::SimulatedSettings& s, std::uint64_t seed_)
+    : protocol(p),
+      settings(s),
+      library(p),
+      hypotheses(shapes_of(checked(p, library, s))),
+      of_blocks(participants::block_hypotheses(p)),
+      seed(seed_) {}
+
+void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& session,
+                           TrialLog& log, const std::function<bool()>& halting) {
+  const protocols::Protocol& protocol = study.protocol;
+  const participants::SimulatedSettings own =
+      participants::individual(study.settings, study.seed, session.participant);
+  devices::SimulatedStylus stylus(own.device, own.hand, protocol.stylus.length,
+                                  protocol.stylus.grip, 1 / protocol.servo_rate);
+  servo::VirtualClock clock(session.clock_ns);
+  servo::Servo servo(stylus, clock, protocol.servo_rate, servo::ForceLimits{},
+                     workspace_of(protocol));
+  if (protocol.passivity_controller) servo.control_passivity();
+  std::unique_ptr<participants::Respondent> participant;
+  if (!protocol.blocks.empty()) {
+    participant = std::make_unique<participants::TaskParticipant>(
+        own, study.hypotheses, study.of_blocks, stylus, protocol, study.seed, session.participant);
+  } else {
+    participant = std::make_unique<participants::SimulatedParticipant>(
+        own, study.hypotheses, stylus, protocol, study.seed, session.participant);
+  }
+  const Station station{protocol, study.library, session.plan, servo,
+                        clock,    session.utc,   log,          session.advisor};
+  Session trials(station, *participant);
+  // A shown trial is recorded, even if the run stops after it.
+  while (trials.state() != Session::State::end &&
+         (trials.state() == Session::State::response || !halting())) {
+    trials.step();
+  }
+}
+
+data::RunInfo simulated_run(const protocols::Protocol& protocol,
+                            const participants::SimulatedSettings& settings, int participant,
+                            int session) {
+  constexpr std::int64_t kDay_ns = 86'400'000'000'000;
+  constexpr std::int64_t kFirstMorning_ns = 946'717'200'000'000'000;  // 2000-01-01T09:00:00Z
+  const std::int64_t day =
+      (participant - 1) * static_cast<std::int64_t>(protocol.sessions.count) + session - 1;
+  data::RunInfo info;
+  info.session = session;
+  info.clock = {kFirstMorning_ns + day * kDay_ns, 0};
+  info.program_version = PALPATE_VERSION;
+  info.build = build_description();
+  info.device = "simulated";
+  info.response_device = "simulated";
+  info.response_latency = 0;
+  info.observer_sha256 = settings.sha256;
+  return info;
+}
+
+bool simulate_in_memory(
+    const protocols::Protocol& protocol, const participants::SimulatedSettings& settings,
+    int participants, std::uint64_t seed, const std::atomic<bool>& stop,
+    const std::function<void(int, const data::TrialRecord&, std::uint64_t)>& visit) {
+  const SimulatedStudy study(protocol, settings, seed);
+  for (int number = 1; number <= participants; ++number) {
+    for (int session = 1; session <= protocol.sessions.count; ++session) {
+      VisitingLog log([&](const data::TrialRecord& record) {
+        const double ticks = *record.contact_share * static_cast<double>(record.ticks);
+        visit(number, record, static_cast<std::uint64_t>(std::llround(ticks)));
+      });
+      run_simulated_session(study,
+                            {number, SessionPlan(protocol, number, session), 0,
+                             simulated_run(protocol, settings, number, session).clock},
+                            log, [&stop] { return stop.load(); });
+      if (stop) return false;
+    }
+  }
+  return true;
+}
 
 std::vector<stimuli::ObjectSpec> shapes_of(const protocols::Protocol& protocol) {
   std::vector<stimuli::ObjectSpec> shapes;

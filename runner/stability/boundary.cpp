@@ -50,6 +50,7 @@ rendering::SceneObject ridge(double h, double x, const stimuli::Material& materi
                 {{x, 0, -h * std::numbers::sqrt2}, turned_about_y(std::numbers::pi / 4)}, material,
                 index);
 }
+constexpr double kHalf = 0.015, kSoftTick = 0.001;  // m, s
 
 std::vector<rendering::SceneObject> objects_of(ContactCase contact_case, bool ray,
                                                const stimuli::Material& material) {
@@ -194,6 +195,23 @@ struct Range {
   double size() const { return high > low ? high - low : 0; }
 };
 
+double lever2(const LoopCase& loop) {
+  return loop.settings.reach ? rendering::stiffness_gain(*loop.settings.reach, 0) : 1;
+}
+
+double felt_stiffness(const LoopCase& loop, double stiffness) {
+  return stiffness * (1 + loop.layer_share) * lever2(loop);
+}
+constexpr int kTicks = 500;
+
+std::vector<double> forces() {
+  Random random(1);
+  std::vector<double> out;
+  out.reserve(kTicks);
+  for (int i = 0; i < kTicks; ++i) out.push_back(4 * random.unit() - 2);
+  return out;
+}
+
 /// A hand, two devices and a renderer in a loop, tick by tick.
 class Loop {
  public:
@@ -299,79 +317,10 @@ class Loop {
   std::vector<Range> swings_;  // of each block
 };
 
-}  // namespace
-
-const char* to_string(ContactCase contact_case) {
-  switch (contact_case) {
-    case ContactCase::wall:
-      return "wall";
-    case ContactCase::edge:
-      return "edge";
-    case ContactCase::sphere:
-      return "sphere";
-    case ContactCase::two_objects:
-      return "two objects";
-    case ContactCase::body:
-      return "body on a wall";
-  }
-  return "";
-}
-
-LoopScene::LoopScene(ContactCase contact_case, protocols::RendererKind kind,
-                     const stimuli::Material& material)
-    : renderer_(&renderer_for(kind)),
-      scene_(scene_of(contact_case, renderer_->side_contact(), material)) {
-  const rendering::LineProbe start = stylus_at_height_0(contact_case, renderer_->side_contact());
-  rendering::RenderState state = scene_.initial_state();
-  rendering::Rendering r;
-  constexpr double kStep = 1e-6;
-  // s; slow ticks, in which damping hardly acts. A body needs shorter ones.
-  const double slow = contact_case == ContactCase::body ? 0.05 : 1;
-  // Lower it from above to the wanted depth: first contact needs a path from outside.
-  for (double down = -2e-3; r.deepest.depth < kDepth; down += kStep) {
-    rest_ = lowered(start, down, down);
-    r = renderer_->tick(scene_, state, rest_, slow);
-    if (down > 0.05) throw std::logic_error("nothing under the stylus");
-  }
-  // A second tick at rest gives the force without damping.
-  r = renderer_->tick(scene_, state, rest_, slow);
-  force_tip_ = r.device1.z;
-  force_tail_ = r.device2.z;
-  contacts_ = static_cast<int>(r.contacts);
-}
-
-namespace {
-
 bool has_grown(const LoopOutcome& o) {
   constexpr double kGrown = 2;  // times the initial swing; more than rounding or a second mode
   return !(o.late_swing <= kGrown * std::max(o.initial_swing, o.floor));
 }
-
-}  // namespace
-
-Verdict verdict_on(const LoopOutcome& o, bool linear) {
-  constexpr double kShrunk = 0.9;  // from the second quarter to the last; less may be chance
-  if (has_grown(o)) return Verdict::unstable;
-  if (o.late_swing <= o.floor) return Verdict::stable;
-  if (linear) return o.late_swing <= o.early_swing ? Verdict::stable : Verdict::unstable;
-  return o.late_swing <= kShrunk * o.early_swing ? Verdict::open : Verdict::unstable;
-}
-
-LoopOutcome run_loop(const LoopSettings& s, const LoopScene& loop) {
-  Loop running(s, loop);
-  constexpr int kDoublings = 6;
-  LoopOutcome outcome;
-  for (int doubling = 0; doubling <= kDoublings; ++doubling) {
-    outcome = running.run(std::uint64_t{4} << doubling);
-    const Verdict verdict = verdict_on(outcome, s.linear());
-    outcome.stable = verdict != Verdict::unstable;
-    // A swing that hardly shrinks in a short run may shrink in a longer one.
-    if (verdict == Verdict::stable || s.linear() || has_grown(outcome)) break;
-  }
-  return outcome;
-}
-
-namespace {
 
 constexpr double kClose = 1.002;     // ratio of the bounds that ends the bisection
 constexpr double kNoDamping = 1e-6;  // N s/m, practically none
@@ -386,14 +335,6 @@ stimuli::Material material_of(const LoopCase& loop, double stiffness) {
   return material;
 }
 
-double lever2(const LoopCase& loop) {
-  return loop.settings.reach ? rendering::stiffness_gain(*loop.settings.reach, 0) : 1;
-}
-
-double felt_stiffness(const LoopCase& loop, double stiffness) {
-  return stiffness * (1 + loop.layer_share) * lever2(loop);
-}
-
 LoopSettings settings_at(const LoopCase& loop, double stiffness, double damping) {
   LoopSettings settings = loop.settings;
   settings.damping = damping;
@@ -402,62 +343,7 @@ LoopSettings settings_at(const LoopCase& loop, double stiffness, double damping)
   return settings;
 }
 
-}  // namespace
-
-double passive_damping(const LoopCase& loop, double stiffness) {
-  return felt_stiffness(loop, stiffness) / loop.settings.rate * (0.5 + loop.settings.delay) +
-         std::abs(loop.virtual_damping) * lever2(loop);
-}
-
-bool is_stable(const LoopCase& loop, double stiffness, double damping) {
-  const LoopScene scene(loop.contact_case, loop.renderer, material_of(loop, stiffness));
-  return run_loop(settings_at(loop, stiffness, damping), scene).stable;
-}
-
-BoundaryPoint boundary_at(const LoopCase& loop, double stiffness) {
-  const LoopSettings& s = loop.settings;
-  BoundaryPoint point;
-  point.stiffness = stiffness;
-  point.theory = passive_damping(loop, stiffness);
-  point.promised =
-      s.resolution == 0 || felt_stiffness(loop, stiffness) <= 2 * s.friction / s.resolution;
-  const LoopScene scene(loop.contact_case, loop.renderer, material_of(loop, stiffness));
-  const auto stable = [&](double damping) {
-    return run_loop(settings_at(loop, stiffness, damping), scene).stable;
-  };
-  double low = kNoDamping, high = point.theory;
-  if (stable(low)) return point;
-  while (!stable(high)) {
-    low = high;
-    high *= 2;
-  }
-  while (high > kClose * low) {
-    const double middle = std::sqrt(low * high);
-    (stable(middle) ? high : low) = middle;
-  }
-  point.measured = high;
-  return point;
-}
-
-double stiffest_stable(const LoopCase& loop, double damping) {
-  const auto stable = [&](double stiffness) { return is_stable(loop, stiffness, damping); };
-  // Search in steps first: a stable stiffness beyond an unstable one must not count.
-  constexpr double kStep = 1.15, kMost = 1e7;
-  double low = 1;
-  while (low < kMost && stable(kStep * low)) low *= kStep;
-  if (low >= kMost) return kMost;
-  double high = kStep * low;
-  while (high > kClose * low) {
-    const double middle = std::sqrt(low * high);
-    (stable(middle) ? low : high) = middle;
-  }
-  return low;
-}
-
-namespace {
-
 constexpr double kTick = 1e-3;  // s
-constexpr int kTicks = 500;
 constexpr int kMostSteps = 1024;
 
 struct State {
@@ -518,14 +404,6 @@ class Reference {
   std::complex<long double> r1_, r2_, e1_, e2_;
 };
 
-std::vector<double> forces() {
-  Random random(1);
-  std::vector<double> out;
-  out.reserve(kTicks);
-  for (int i = 0; i < kTicks; ++i) out.push_back(4 * random.unit() - 2);
-  return out;
-}
-
 /// \param make  returns a function that advances by a tick under a force and returns the position
 template <class Make>
 IntegratorRow measure(const Oscillator& o, const char* method, int steps,
@@ -555,7 +433,155 @@ IntegratorRow measure(const Oscillator& o, const char* method, int steps,
   return row;
 }
 
+constexpr double kModuli[] = {1e3, 1e4, 1e5, 1e6, 1e7};   // Pa
+constexpr double kRates[] = {62.5, 125, 250, 500, 1000};  // Hz
+constexpr double kSprings[] = {200, 800, 3000};           // N/m
+constexpr int kHeldTicks = 1500, kWatchedTicks = 200;
+constexpr int kLongestHeldTicks = 12500, kLongWatchedTicks = 1000;  // for undamped bodies
+
+rendering::SoftObject slab(const SoftCase& what) {
+  stimuli::SolidMesh mesh = stimuli::mesh_of_box({0.06, 0.06, 2 * kHalf}, {4, 4, 2});
+  std::vector<std::uint32_t> held;
+  for (std::uint32_t i = 0; i < mesh.nodes.size(); ++i) {
+    if (mesh.nodes[i].z < -0.999 * kHalf) held.push_back(i);
+  }
+  const rendering::SoftSettings settings{
+      .material = {.young = what.young, .poisson = what.poisson, .damping = what.damping},
+      .step = 1 / what.rate};
+  return {std::make_shared<const rendering::SoftBody>(std::move(mesh), held, settings),
+          {.radius = what.radius, .stiffness = what.stiffness},
+          0};
+}
+
+struct WorstSwing {
+  double share = 0;
+  bool accepted = false, finite = true;
+};
+
+WorstSwing worst_of(const std::vector<SoftSwing>& map, double young, double rate) {
+  WorstSwing out;
+  for (const SoftSwing& one : map) {
+    if (one.what.young != young || one.what.rate != rate) continue;
+    out.finite = out.finite && one.finite;
+    if (!one.accepted) continue;
+    out.accepted = true;
+    out.share = std::max(out.share, one.swing);
+  }
+  return out;
+}
+
 }  // namespace
+
+const char* to_string(ContactCase contact_case) {
+  switch (contact_case) {
+    case ContactCase::wall:
+      return "wall";
+    case ContactCase::edge:
+      return "edge";
+    case ContactCase::sphere:
+      return "sphere";
+    case ContactCase::two_objects:
+      return "two objects";
+    case ContactCase::body:
+      return "body on a wall";
+  }
+  return "";
+}
+
+LoopScene::LoopScene(ContactCase contact_case, protocols::RendererKind kind,
+                     const stimuli::Material& material)
+    : renderer_(&renderer_for(kind)),
+      scene_(scene_of(contact_case, renderer_->side_contact(), material)) {
+  const rendering::LineProbe start = stylus_at_height_0(contact_case, renderer_->side_contact());
+  rendering::RenderState state = scene_.initial_state();
+  rendering::Rendering r;
+  constexpr double kStep = 1e-6;
+  // s; slow ticks, in which damping hardly acts. A body needs shorter ones.
+  const double slow = contact_case == ContactCase::body ? 0.05 : 1;
+  // Lower it from above to the wanted depth: first contact needs a path from outside.
+  for (double down = -2e-3; r.deepest.depth < kDepth; down += kStep) {
+    rest_ = lowered(start, down, down);
+    r = renderer_->tick(scene_, state, rest_, slow);
+    if (down > 0.05) throw std::logic_error("nothing under the stylus");
+  }
+  // A second tick at rest gives the force without damping.
+  r = renderer_->tick(scene_, state, rest_, slow);
+  force_tip_ = r.device1.z;
+  force_tail_ = r.device2.z;
+  contacts_ = static_cast<int>(r.contacts);
+}
+
+Verdict verdict_on(const LoopOutcome& o, bool linear) {
+  constexpr double kShrunk = 0.9;  // from the second quarter to the last; less may be chance
+  if (has_grown(o)) return Verdict::unstable;
+  if (o.late_swing <= o.floor) return Verdict::stable;
+  if (linear) return o.late_swing <= o.early_swing ? Verdict::stable : Verdict::unstable;
+  return o.late_swing <= kShrunk * o.early_swing ? Verdict::open : Verdict::unstable;
+}
+
+LoopOutcome run_loop(const LoopSettings& s, const LoopScene& loop) {
+  Loop running(s, loop);
+  constexpr int kDoublings = 6;
+  LoopOutcome outcome;
+  for (int doubling = 0; doubling <= kDoublings; ++doubling) {
+    outcome = running.run(std::uint64_t{4} << doubling);
+    const Verdict verdict = verdict_on(outcome, s.linear());
+    outcome.stable = verdict != Verdict::unstable;
+    // A swing that hardly shrinks in a short run may shrink in a longer one.
+    if (verdict == Verdict::stable || s.linear() || has_grown(outcome)) break;
+  }
+  return outcome;
+}
+
+double passive_damping(const LoopCase& loop, double stiffness) {
+  return felt_stiffness(loop, stiffness) / loop.settings.rate * (0.5 + loop.settings.delay) +
+         std::abs(loop.virtual_damping) * lever2(loop);
+}
+
+bool is_stable(const LoopCase& loop, double stiffness, double damping) {
+  const LoopScene scene(loop.contact_case, loop.renderer, material_of(loop, stiffness));
+  return run_loop(settings_at(loop, stiffness, damping), scene).stable;
+}
+
+BoundaryPoint boundary_at(const LoopCase& loop, double stiffness) {
+  const LoopSettings& s = loop.settings;
+  BoundaryPoint point;
+  point.stiffness = stiffness;
+  point.theory = passive_damping(loop, stiffness);
+  point.promised =
+      s.resolution == 0 || felt_stiffness(loop, stiffness) <= 2 * s.friction / s.resolution;
+  const LoopScene scene(loop.contact_case, loop.renderer, material_of(loop, stiffness));
+  const auto stable = [&](double damping) {
+    return run_loop(settings_at(loop, stiffness, damping), scene).stable;
+  };
+  double low = kNoDamping, high = point.theory;
+  if (stable(low)) return point;
+  while (!stable(high)) {
+    low = high;
+    high *= 2;
+  }
+  while (high > kClose * low) {
+    const double middle = std::sqrt(low * high);
+    (stable(middle) ? high : low) = middle;
+  }
+  point.measured = high;
+  return point;
+}
+
+double stiffest_stable(const LoopCase& loop, double damping) {
+  const auto stable = [&](double stiffness) { return is_stable(loop, stiffness, damping); };
+  // Search in steps first: a stable stiffness beyond an unstable one must not count.
+  constexpr double kStep = 1.15, kMost = 1e7;
+  double low = 1;
+  while (low < kMost && stable(kStep * low)) low *= kStep;
+  if (low >= kMost) return kMost;
+  double high = kStep * low;
+  while (high > kClose * low) {
+    const double middle = std::sqrt(low * high);
+    (stable(middle) ? low : high) = middle;
+  }
+  return low;
+}
 
 std::vector<IntegratorRow> compare_integrators(const std::function<double()>& now_ns) {
   const Oscillator oscillators[] = {{"relaxed hand (400 N/m, 10 N s/m)", 0.1, 10, 400},
@@ -595,48 +621,6 @@ std::vector<IntegratorRow> compare_integrators(const std::function<double()>& no
   }
   return rows;
 }
-
-namespace {
-
-constexpr double kModuli[] = {1e3, 1e4, 1e5, 1e6, 1e7};   // Pa
-constexpr double kRates[] = {62.5, 125, 250, 500, 1000};  // Hz
-constexpr double kSprings[] = {200, 800, 3000};           // N/m
-constexpr double kHalf = 0.015, kSoftTick = 0.001;        // m, s
-constexpr int kHeldTicks = 1500, kWatchedTicks = 200;
-constexpr int kLongestHeldTicks = 12500, kLongWatchedTicks = 1000;  // for undamped bodies
-
-rendering::SoftObject slab(const SoftCase& what) {
-  stimuli::SolidMesh mesh = stimuli::mesh_of_box({0.06, 0.06, 2 * kHalf}, {4, 4, 2});
-  std::vector<std::uint32_t> held;
-  for (std::uint32_t i = 0; i < mesh.nodes.size(); ++i) {
-    if (mesh.nodes[i].z < -0.999 * kHalf) held.push_back(i);
-  }
-  const rendering::SoftSettings settings{
-      .material = {.young = what.young, .poisson = what.poisson, .damping = what.damping},
-      .step = 1 / what.rate};
-  return {std::make_shared<const rendering::SoftBody>(std::move(mesh), held, settings),
-          {.radius = what.radius, .stiffness = what.stiffness},
-          0};
-}
-
-struct WorstSwing {
-  double share = 0;
-  bool accepted = false, finite = true;
-};
-
-WorstSwing worst_of(const std::vector<SoftSwing>& map, double young, double rate) {
-  WorstSwing out;
-  for (const SoftSwing& one : map) {
-    if (one.what.young != young || one.what.rate != rate) continue;
-    out.finite = out.finite && one.finite;
-    if (!one.accepted) continue;
-    out.accepted = true;
-    out.share = std::max(out.share, one.swing);
-  }
-  return out;
-}
-
-}  // namespace
 
 SoftSwing press_and_hold(const SoftCase& what) {
   const rendering::SoftObject object = slab(what);

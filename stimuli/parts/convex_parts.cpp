@@ -50,62 +50,6 @@ void check_volume(const TriangleSurface& solid, const std::vector<ConvexMesh>& p
   });
 }
 
-}  // namespace
-
-double volume_of(const ConvexMesh& mesh) {
-  double volume = 0;
-  for (std::uint32_t f = 0; f < mesh.facets().size(); ++f) {
-    const Facet& facet = mesh.facets()[f];
-    const auto corner = [&](std::uint32_t k) {
-      const Edge& edge = mesh.edges()[mesh.sides()[facet.first_side + k].edge];
-      return (edge.left == f ? edge.from : edge.to) - mesh.centre();
-    };
-    const Vec3 first = corner(0);
-    for (std::uint32_t k = 2; k < facet.side_count; ++k)
-      volume += glm::dot(first, glm::cross(corner(k - 1), corner(k))) / 6;
-  }
-  return volume;
-}
-
-void check_cover(const TriangleSurface& solid, const std::vector<ConvexMesh>& parts, double slack,
-                 MeshFaults& faults) {
-  check_volume(solid, parts, slack, faults);
-  Vec3 low = solid[0][0], high = low;
-  for (const auto& triangle : solid) {
-    for (const Vec3& corner : triangle) {
-      low = glm::min(low, corner);
-      high = glm::max(high, corner);
-    }
-  }
-  const double near = 1e-6 * glm::length(high - low);  // of a surface: either answer is right
-  Random random(1);
-  for (int i = 0; i < kPoints; ++i) {
-    Vec3 point;
-    for (int axis = 0; axis < 3; ++axis)
-      point[axis] = low[axis] + (high[axis] - low[axis]) * random.unit();
-    int in = 0;
-    bool doubtful = false;
-    for (const ConvexMesh& part : parts) {
-      const double out = out_of(part, point);
-      doubtful |= std::abs(out) < near;
-      in += out < 0 ? 1 : 0;
-    }
-    const double winding = winding_number(solid, point);
-    if (doubtful || std::abs(winding - in) < 0.01) continue;
-    faults.add("not covered", [&] {
-      char text[200];
-      std::snprintf(
-          text, sizeof text,
-          "the point (%.4g, %.4g, %.4g) m lies in %d of the convex parts, but the surface "
-          "winds round it %.2f times",
-          point.x, point.y, point.z, in, winding);
-      return std::string(text);
-    });
-  }
-}
-
-namespace {
-
 using Index = std::uint32_t;
 
 /// Takes some faces of a soup out, with the vertices that they use.
@@ -245,42 +189,6 @@ std::vector<SolidGroup> with_voids(std::vector<Solid> solids) {
   return groups;
 }
 
-}  // namespace
-
-std::vector<SolidGroup> solid_groups(const PolygonSoup& soup) {
-  if (soup.group_names.size() < 2) return {};
-  std::vector<std::vector<Index>> faces_of(soup.group_names.size());
-  for (Index f = 0; f < soup.faces.size(); ++f) faces_of[soup.group_of[f]].push_back(f);
-  Subsets subsets(soup);
-  std::vector<Solid> closed;
-  std::vector<Index> rest;
-  for (std::size_t g = 0; g < faces_of.size(); ++g) {
-    if (faces_of[g].empty()) continue;
-    PolygonSoup group = subsets.of(faces_of[g]);
-    if (!is_closed(group)) {
-      rest.insert(rest.end(), faces_of[g].begin(), faces_of[g].end());
-      continue;
-    }
-    closed.push_back(solid_of({"group '" + soup.group_names[g] + "'", std::move(group)}));
-    if (closed.size() > kMostClosedGroups) {
-      MeshFaults faults;
-      faults.add("too many groups", [] {
-        return "expected at most " + std::to_string(kMostClosedGroups) +
-               " that are closed by themselves, found more";
-      });
-      faults.throw_if_any();
-    }
-  }
-  if (closed.empty()) return {};
-  if (!rest.empty()) {
-    std::sort(rest.begin(), rest.end());
-    closed.push_back(solid_of({"the groups that are not closed by themselves", subsets.of(rest)}));
-  }
-  return with_voids(std::move(closed));
-}
-
-namespace {
-
 // m, of the coordinates' error: facets are taken for plane within 8 errors, and a corner must not
 // lie on one of two facets that meet in it and miss the other.
 constexpr double kErrors = 16;
@@ -377,6 +285,90 @@ double diagonal_of(const PolygonSoup& soup) {
 }
 
 }  // namespace
+
+double volume_of(const ConvexMesh& mesh) {
+  double volume = 0;
+  for (std::uint32_t f = 0; f < mesh.facets().size(); ++f) {
+    const Facet& facet = mesh.facets()[f];
+    const auto corner = [&](std::uint32_t k) {
+      const Edge& edge = mesh.edges()[mesh.sides()[facet.first_side + k].edge];
+      return (edge.left == f ? edge.from : edge.to) - mesh.centre();
+    };
+    const Vec3 first = corner(0);
+    for (std::uint32_t k = 2; k < facet.side_count; ++k)
+      volume += glm::dot(first, glm::cross(corner(k - 1), corner(k))) / 6;
+  }
+  return volume;
+}
+
+void check_cover(const TriangleSurface& solid, const std::vector<ConvexMesh>& parts, double slack,
+                 MeshFaults& faults) {
+  check_volume(solid, parts, slack, faults);
+  Vec3 low = solid[0][0], high = low;
+  for (const auto& triangle : solid) {
+    for (const Vec3& corner : triangle) {
+      low = glm::min(low, corner);
+      high = glm::max(high, corner);
+    }
+  }
+  const double near = 1e-6 * glm::length(high - low);  // of a surface: either answer is right
+  Random random(1);
+  for (int i = 0; i < kPoints; ++i) {
+    Vec3 point;
+    for (int axis = 0; axis < 3; ++axis)
+      point[axis] = low[axis] + (high[axis] - low[axis]) * random.unit();
+    int in = 0;
+    bool doubtful = false;
+    for (const ConvexMesh& part : parts) {
+      const double out = out_of(part, point);
+      doubtful |= std::abs(out) < near;
+      in += out < 0 ? 1 : 0;
+    }
+    const double winding = winding_number(solid, point);
+    if (doubtful || std::abs(winding - in) < 0.01) continue;
+    faults.add("not covered", [&] {
+      char text[200];
+      std::snprintf(
+          text, sizeof text,
+          "the point (%.4g, %.4g, %.4g) m lies in %d of the convex parts, but the surface "
+          "winds round it %.2f times",
+          point.x, point.y, point.z, in, winding);
+      return std::string(text);
+    });
+  }
+}
+
+std::vector<SolidGroup> solid_groups(const PolygonSoup& soup) {
+  if (soup.group_names.size() < 2) return {};
+  std::vector<std::vector<Index>> faces_of(soup.group_names.size());
+  for (Index f = 0; f < soup.faces.size(); ++f) faces_of[soup.group_of[f]].push_back(f);
+  Subsets subsets(soup);
+  std::vector<Solid> closed;
+  std::vector<Index> rest;
+  for (std::size_t g = 0; g < faces_of.size(); ++g) {
+    if (faces_of[g].empty()) continue;
+    PolygonSoup group = subsets.of(faces_of[g]);
+    if (!is_closed(group)) {
+      rest.insert(rest.end(), faces_of[g].begin(), faces_of[g].end());
+      continue;
+    }
+    closed.push_back(solid_of({"group '" + soup.group_names[g] + "'", std::move(group)}));
+    if (closed.size() > kMostClosedGroups) {
+      MeshFaults faults;
+      faults.add("too many groups", [] {
+        return "expected at most " + std::to_string(kMostClosedGroups) +
+               " that are closed by themselves, found more";
+      });
+      faults.throw_if_any();
+    }
+  }
+  if (closed.empty()) return {};
+  if (!rest.empty()) {
+    std::sort(rest.begin(), rest.end());
+    closed.push_back(solid_of({"the groups that are not closed by themselves", subsets.of(rest)}));
+  }
+  return with_voids(std::move(closed));
+}
 
 std::vector<ConvexMesh> cut_into_convex_parts(const PolygonSoup& soup) {
   // A file may show more digits than it has, and planes that meet at small angles miss corners by

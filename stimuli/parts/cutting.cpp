@@ -12,6 +12,7 @@
 #include "stimuli/parts/facets.h"
 
 namespace palpate::stimuli {
+namespace {
 
 // Which plane to cut a cell of a concave solid by next.
 
@@ -40,8 +41,6 @@ class CuttingPlanes {
   std::vector<std::vector<std::uint32_t>> through_;  // of each concave edge
 };
 
-namespace {
-
 constexpr std::size_t kAllPairs = 96;    // concave edges; up to so many, try every pair
 constexpr std::size_t kTriedEdges = 48;  // of a cell, whose planes are tried
 constexpr double kRounding = 1e-9;       // of a sine
@@ -68,8 +67,6 @@ double gain_of(const ConcaveEdge& edge, const Plane& plane) {
   if (angle < 0) return 0;
   return angle < kThin ? 0.1 : 1;
 }
-
-}  // namespace
 
 CuttingPlanes::CuttingPlanes(const FacetedSolid& solid, PlaneTable& planes)
     : solid_(solid), planes_(planes), through_(solid.concave.size()) {
@@ -197,8 +194,6 @@ void CuttingPlanes::divide_ridges(const std::vector<Ridge>& ridges, std::uint32_
     }
   }
 }
-
-namespace {
 
 constexpr std::size_t kMostCells = 16 * kMostParts;
 

@@ -67,60 +67,6 @@ bool is_concave(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, Ind
   return glm::dot(glm::cross(left, right), along) < -1e-6;
 }
 
-}  // namespace
-
-FacetedSolid faceted_solid(const HalfEdges& mesh, PlaneTable& planes, MeshFaults& faults) {
-  const std::vector<FaceShape> shapes = shapes_of(mesh);
-  check_flatness(mesh, shapes, faults);
-  FacetedSolid solid;
-  solid.points = mesh.points;
-  solid.size = mesh.size;
-  solid.error = mesh.error;
-  Index count = 0;
-  const std::vector<Index> region_of = coplanar_regions(mesh, shapes, count);
-  if (count == 0) faults.add("flat", [] { return "expected a solid, found lines only"; });
-  if (!faults.empty()) return solid;
-  std::vector<Region> regions = regions_of(mesh, shapes, region_of, count);
-  number_planes(regions, planes);
-
-  std::vector<Vec3> corners;
-  for (Index f = 0; f < mesh.face_count(); ++f) {
-    corners.clear();
-    for (Index h = mesh.first[f]; h < mesh.first[f + 1]; ++h) corners.push_back(mesh.from(h));
-    const Region& region = regions[region_of[f]];
-    const auto triangles = triangulate(corners, shapes[f].thin ? region.normal : shapes[f].normal);
-    if (triangles.empty()) {
-      faults.add("crossed face", [&] {
-        return mesh.name_face(f) + ": expected a simple polygon, found one that crosses itself";
-      });
-    }
-    solid.triangles.insert(solid.triangles.end(), triangles.begin(), triangles.end());
-    if (shapes[f].thin) continue;
-    if (is_convex_polygon(corners, shapes[f].normal)) {
-      solid.surface.push_back({corners, region.on});
-    } else {
-      for (const auto& t : triangles) solid.surface.push_back({{t[0], t[1], t[2]}, region.on});
-    }
-  }
-  for (Index h = 0; h < mesh.count(); ++h) {
-    const Index twin = mesh.twin[h];
-    if (twin == HalfEdges::kNone || twin < h) continue;
-    const Index f = region_of[mesh.face[h]], g = region_of[mesh.face[twin]];
-    if (f == g) continue;
-    const Vec3 left = glm::normalize(regions[f].normal), right = glm::normalize(regions[g].normal);
-    if (!is_concave(mesh, shapes, h, left, right)) continue;
-    solid.concave.push_back({mesh.from(h),
-                             mesh.to(h),
-                             left,
-                             right,
-                             {regions[f].on, regions[g].on},
-                             {mesh.origin[h], mesh.origin[mesh.next(h)]}});
-  }
-  return solid;
-}
-
-namespace {
-
 // Twice the signed area of a triangle, as seen against `normal` (unit).
 double turn(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& normal) {
   return glm::dot(glm::cross(b - a, c - b), normal);
@@ -190,6 +136,56 @@ class EarCutter {
 };
 
 }  // namespace
+
+FacetedSolid faceted_solid(const HalfEdges& mesh, PlaneTable& planes, MeshFaults& faults) {
+  const std::vector<FaceShape> shapes = shapes_of(mesh);
+  check_flatness(mesh, shapes, faults);
+  FacetedSolid solid;
+  solid.points = mesh.points;
+  solid.size = mesh.size;
+  solid.error = mesh.error;
+  Index count = 0;
+  const std::vector<Index> region_of = coplanar_regions(mesh, shapes, count);
+  if (count == 0) faults.add("flat", [] { return "expected a solid, found lines only"; });
+  if (!faults.empty()) return solid;
+  std::vector<Region> regions = regions_of(mesh, shapes, region_of, count);
+  number_planes(regions, planes);
+
+  std::vector<Vec3> corners;
+  for (Index f = 0; f < mesh.face_count(); ++f) {
+    corners.clear();
+    for (Index h = mesh.first[f]; h < mesh.first[f + 1]; ++h) corners.push_back(mesh.from(h));
+    const Region& region = regions[region_of[f]];
+    const auto triangles = triangulate(corners, shapes[f].thin ? region.normal : shapes[f].normal);
+    if (triangles.empty()) {
+      faults.add("crossed face", [&] {
+        return mesh.name_face(f) + ": expected a simple polygon, found one that crosses itself";
+      });
+    }
+    solid.triangles.insert(solid.triangles.end(), triangles.begin(), triangles.end());
+    if (shapes[f].thin) continue;
+    if (is_convex_polygon(corners, shapes[f].normal)) {
+      solid.surface.push_back({corners, region.on});
+    } else {
+      for (const auto& t : triangles) solid.surface.push_back({{t[0], t[1], t[2]}, region.on});
+    }
+  }
+  for (Index h = 0; h < mesh.count(); ++h) {
+    const Index twin = mesh.twin[h];
+    if (twin == HalfEdges::kNone || twin < h) continue;
+    const Index f = region_of[mesh.face[h]], g = region_of[mesh.face[twin]];
+    if (f == g) continue;
+    const Vec3 left = glm::normalize(regions[f].normal), right = glm::normalize(regions[g].normal);
+    if (!is_concave(mesh, shapes, h, left, right)) continue;
+    solid.concave.push_back({mesh.from(h),
+                             mesh.to(h),
+                             left,
+                             right,
+                             {regions[f].on, regions[g].on},
+                             {mesh.origin[h], mesh.origin[mesh.next(h)]}});
+  }
+  return solid;
+}
 
 bool is_convex_polygon(std::span<const Vec3> corners, const Vec3& normal) {
   const std::size_t count = corners.size();

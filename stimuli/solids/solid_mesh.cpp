@@ -125,38 +125,6 @@ SolidMesh mesh_of_ball(double radius, int resolution) {
   return blocks.take();
 }
 
-}  // namespace
-
-SolidMesh mesh_of_box(const Vec3& size, const std::array<int, 3>& counts) {
-  BlockBuilder blocks(1e-7 * std::max({size.x, size.y, size.z}));
-  blocks.add_block(counts, [&](const Vec3& u) { return (u - Vec3(0.5)) * size; });
-  return blocks.take();
-}
-
-SolidMesh mesh_of_primitive(const ObjectSpec& spec, int resolution) {
-  switch (spec.shape) {
-    case ShapeKind::cube:
-    case ShapeKind::box: {
-      const Vec3 size = spec.shape == ShapeKind::cube ? Vec3(spec.edge) : spec.size;
-      const double longest = std::max({size.x, size.y, size.z});
-      return mesh_of_box(
-          size, {count_along(size.x, longest, resolution), count_along(size.y, longest, resolution),
-                 count_along(size.z, longest, resolution)});
-    }
-    case ShapeKind::cylinder:
-      return mesh_of_cylinder(spec.radius, spec.height, resolution);
-    case ShapeKind::sphere:
-      return mesh_of_ball(spec.radius, resolution);
-    case ShapeKind::cone:
-    case ShapeKind::mesh:
-    case ShapeKind::compound:
-      break;
-  }
-  throw std::invalid_argument("no hexahedra for this shape");
-}
-
-namespace {
-
 // Counter-clockwise from outside.
 constexpr int kHexahedronFaces[6][4] = {{0, 3, 2, 1}, {4, 5, 6, 7}, {0, 1, 5, 4},
                                         {1, 2, 6, 5}, {2, 3, 7, 6}, {3, 0, 4, 7}};
@@ -195,6 +163,34 @@ class OpenFaces {
 };
 
 }  // namespace
+
+SolidMesh mesh_of_box(const Vec3& size, const std::array<int, 3>& counts) {
+  BlockBuilder blocks(1e-7 * std::max({size.x, size.y, size.z}));
+  blocks.add_block(counts, [&](const Vec3& u) { return (u - Vec3(0.5)) * size; });
+  return blocks.take();
+}
+
+SolidMesh mesh_of_primitive(const ObjectSpec& spec, int resolution) {
+  switch (spec.shape) {
+    case ShapeKind::cube:
+    case ShapeKind::box: {
+      const Vec3 size = spec.shape == ShapeKind::cube ? Vec3(spec.edge) : spec.size;
+      const double longest = std::max({size.x, size.y, size.z});
+      return mesh_of_box(
+          size, {count_along(size.x, longest, resolution), count_along(size.y, longest, resolution),
+                 count_along(size.z, longest, resolution)});
+    }
+    case ShapeKind::cylinder:
+      return mesh_of_cylinder(spec.radius, spec.height, resolution);
+    case ShapeKind::sphere:
+      return mesh_of_ball(spec.radius, resolution);
+    case ShapeKind::cone:
+    case ShapeKind::mesh:
+    case ShapeKind::compound:
+      break;
+  }
+  throw std::invalid_argument("no hexahedra for this shape");
+}
 
 std::vector<SurfaceTriangle> surface_of(const SolidMesh& mesh) {
   std::vector<SurfaceTriangle> surface;

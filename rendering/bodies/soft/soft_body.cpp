@@ -73,6 +73,153 @@ inline Derivatives<10> at_point(std::integral_constant<int, 10> /*nodes*/, int p
 }  // namespace palpate::rendering::elements
 
 namespace palpate::rendering {
+namespace {
+
+/// Several 3 x 3 matrices side by side: [row][column][which].
+template <int kPoints>
+using Matrices = double[3][3][kPoints];
+
+template <int kPoints>
+void cofactors(const Matrices<kPoints>& f, Matrices<kPoints>& cof, double (&det)[kPoints]) {
+  for (int i = 0; i < 3; ++i) {
+    const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
+    for (int j = 0; j < 3; ++j) {
+      const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
+      for (int q = 0; q < kPoints; ++q)
+        cof[i][j][q] = f[i1][j1][q] * f[i2][j2][q] - f[i1][j2][q] * f[i2][j1][q];
+    }
+  }
+  for (int q = 0; q < kPoints; ++q)
+    det[q] = f[0][0][q] * cof[0][0][q] + f[0][1][q] * cof[0][1][q] + f[0][2][q] * cof[0][2][q];
+}
+
+constexpr int kPairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
+
+/// Green's strain (F^T F - 1) / 2, six components.
+template <int kPoints>
+void green_strain(const Matrices<kPoints>& f, double (&green)[6][kPoints]) {
+  for (int c = 0; c < 6; ++c) {
+    const int i = kPairs[c][0], j = kPairs[c][1];
+    for (int q = 0; q < kPoints; ++q) {
+      green[c][q] = 0.5 * (f[0][i][q] * f[0][j][q] + f[1][i][q] * f[1][j][q] +
+                           f[2][i][q] * f[2][j][q] - (i == j ? 1 : 0));
+    }
+  }
+}
+
+/// Gradient of the deformation at every integration point.
+template <int kNodes, int kPoints, class Shape>
+void deformation(const Shape& shape, const std::array<std::uint32_t, kNodes>& nodes,
+                 std::span<const Vec3> x, Matrices<kPoints>& f) {
+  for (auto& row : f) {
+    for (auto& entry : row) std::fill(entry, entry + kPoints, 0.0);
+  }
+  for (int a = 0; a < kNodes; ++a) {
+    const Vec3& p = x[nodes[static_cast<std::size_t>(a)]];
+    for (int i = 0; i < 3; ++i) {
+      const double along = p[i];
+      for (int j = 0; j < 3; ++j) {
+        for (int q = 0; q < kPoints; ++q) f[i][j][q] += along * shape.gradient[a][j][q];
+      }
+    }
+  }
+}
+
+template <int kPoints>
+double weighted_mean(const double (&values)[kPoints], const double (&weights)[kPoints],
+                     double volume) {
+  double sum = 0;
+  for (int q = 0; q < kPoints; ++q) sum += weights[q] * values[q];
+  return sum / volume;
+}
+
+bool is_finite(const Vec3& v) { return std::isfinite(v.x + v.y + v.z); }
+
+std::vector<bool> marked(std::size_t count, const std::vector<std::uint32_t>& which) {
+  std::vector<bool> marks(count, false);
+  for (const std::uint32_t i : which) marks[i] = true;
+  return marks;
+}
+
+std::vector<std::uint32_t> unmarked(const std::vector<bool>& marks) {
+  std::vector<std::uint32_t> rest;
+  for (std::uint32_t i = 0; i < marks.size(); ++i) {
+    if (!marks[i]) rest.push_back(i);
+  }
+  return rest;
+}
+
+/// Mass / step^2 + (1 + damping / step) stiffness, of the free nodes.
+Factor factorised(const Solid& solid, const std::vector<bool>& is_fixed,
+                  const std::vector<std::uint32_t>& free, const SoftSettings& settings) {
+  std::vector<std::uint32_t> row(is_fixed.size());
+  std::vector<MatrixEntry> entries;
+  for (std::uint32_t i = 0; i < free.size(); ++i) {
+    row[free[i]] = 3 * i;
+    const double mass = solid.masses()[free[i]];
+    if (!(mass > 0))
+      throw std::invalid_argument("node " + std::to_string(free[i] + 1) + " belongs to no element");
+    for (std::uint32_t c = 0; c < 3; ++c)
+      entries.push_back({3 * i + c, 3 * i + c, mass / (settings.step * settings.step)});
+  }
+  const double scale = 1 + settings.material.damping / settings.step;
+  for (const Solid::Block& block : solid.stiffness()) {
+    if (is_fixed[block.row] || is_fixed[block.column]) continue;
+    for (std::uint32_t i = 0; i < 3; ++i) {
+      for (std::uint32_t j = 0; j < 3; ++j) {
+        entries.push_back(
+            {row[block.row] + i, row[block.column] + j, scale * block.value[3 * i + j]});
+      }
+    }
+  }
+  return {3 * free.size(), entries};
+}
+
+constexpr double kArmijo = 1e-4;  // of the decrease predicted by the slope
+constexpr int kHalvings = 30;
+constexpr double kRounding = 1e-14;  // of the energy: less is not an increase
+// The quadratic model is trusted if a whole step lowers the potential by between this share of the
+// predicted decrease and 1 / it. Otherwise another iteration is worth its time.
+constexpr double kTrusted = 0.9;
+
+double dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += glm::dot(a[i], b[i]);
+  return sum;
+}
+
+double longest(const std::vector<Vec3>& ways) {
+  double square = 0;
+  for (const Vec3& way : ways) square = std::max(square, glm::dot(way, way));
+  return std::sqrt(square);
+}
+
+constexpr std::size_t kClusterTriangles = 16;
+
+/// Halves a list of items with places along their longest extent.
+void halve(std::vector<std::uint32_t>& order, std::size_t from, std::size_t to,
+           const std::vector<Vec3>& places, std::vector<std::size_t>& ends) {
+  if (to - from <= kClusterTriangles) {
+    ends.push_back(to);
+    return;
+  }
+  Vec3 low(std::numeric_limits<double>::infinity()), high = -low;
+  for (std::size_t i = from; i < to; ++i) {
+    low = glm::min(low, places[order[i]]);
+    high = glm::max(high, places[order[i]]);
+  }
+  const Vec3 size = high - low;
+  const int axis = size.x >= size.y && size.x >= size.z ? 0 : (size.y >= size.z ? 1 : 2);
+  std::stable_sort(
+      order.begin() + static_cast<std::ptrdiff_t>(from),
+      order.begin() + static_cast<std::ptrdiff_t>(to),
+      [&](std::uint32_t a, std::uint32_t b) { return places[a][axis] < places[b][axis]; });
+  const std::size_t middle = from + (to - from) / 2;
+  halve(order, from, middle, places, ends);
+  halve(order, middle, to, places, ends);
+}
+
+}  // namespace
 
 Factor::Factor(std::size_t size, const std::vector<MatrixEntry>& entries) {
   using Matrix = Eigen::SparseMatrix<double>;
@@ -205,68 +352,6 @@ void Factor::solve(std::span<double> b, std::span<double> work) const {
 void Factor::solve_several(std::span<double> b, std::span<double> work) const {
   solve_sides<kTogether>(b.data(), work.data());
 }
-
-namespace {
-
-/// Several 3 x 3 matrices side by side: [row][column][which].
-template <int kPoints>
-using Matrices = double[3][3][kPoints];
-
-template <int kPoints>
-void cofactors(const Matrices<kPoints>& f, Matrices<kPoints>& cof, double (&det)[kPoints]) {
-  for (int i = 0; i < 3; ++i) {
-    const int i1 = (i + 1) % 3, i2 = (i + 2) % 3;
-    for (int j = 0; j < 3; ++j) {
-      const int j1 = (j + 1) % 3, j2 = (j + 2) % 3;
-      for (int q = 0; q < kPoints; ++q)
-        cof[i][j][q] = f[i1][j1][q] * f[i2][j2][q] - f[i1][j2][q] * f[i2][j1][q];
-    }
-  }
-  for (int q = 0; q < kPoints; ++q)
-    det[q] = f[0][0][q] * cof[0][0][q] + f[0][1][q] * cof[0][1][q] + f[0][2][q] * cof[0][2][q];
-}
-
-constexpr int kPairs[6][2] = {{0, 0}, {1, 1}, {2, 2}, {0, 1}, {1, 2}, {2, 0}};
-
-/// Green's strain (F^T F - 1) / 2, six components.
-template <int kPoints>
-void green_strain(const Matrices<kPoints>& f, double (&green)[6][kPoints]) {
-  for (int c = 0; c < 6; ++c) {
-    const int i = kPairs[c][0], j = kPairs[c][1];
-    for (int q = 0; q < kPoints; ++q) {
-      green[c][q] = 0.5 * (f[0][i][q] * f[0][j][q] + f[1][i][q] * f[1][j][q] +
-                           f[2][i][q] * f[2][j][q] - (i == j ? 1 : 0));
-    }
-  }
-}
-
-/// Gradient of the deformation at every integration point.
-template <int kNodes, int kPoints, class Shape>
-void deformation(const Shape& shape, const std::array<std::uint32_t, kNodes>& nodes,
-                 std::span<const Vec3> x, Matrices<kPoints>& f) {
-  for (auto& row : f) {
-    for (auto& entry : row) std::fill(entry, entry + kPoints, 0.0);
-  }
-  for (int a = 0; a < kNodes; ++a) {
-    const Vec3& p = x[nodes[static_cast<std::size_t>(a)]];
-    for (int i = 0; i < 3; ++i) {
-      const double along = p[i];
-      for (int j = 0; j < 3; ++j) {
-        for (int q = 0; q < kPoints; ++q) f[i][j][q] += along * shape.gradient[a][j][q];
-      }
-    }
-  }
-}
-
-template <int kPoints>
-double weighted_mean(const double (&values)[kPoints], const double (&weights)[kPoints],
-                     double volume) {
-  double sum = 0;
-  for (int q = 0; q < kPoints; ++q) sum += weights[q] * values[q];
-  return sum / volume;
-}
-
-}  // namespace
 
 Solid::Solid(const stimuli::SolidMesh& mesh, const SoftMaterial& material)
     : mu_(material.young / (2 * (1 + material.poisson))),
@@ -512,52 +597,6 @@ std::vector<Solid::Block> Solid::stiffness() const {
   return blocks;
 }
 
-namespace {
-
-bool is_finite(const Vec3& v) { return std::isfinite(v.x + v.y + v.z); }
-
-std::vector<bool> marked(std::size_t count, const std::vector<std::uint32_t>& which) {
-  std::vector<bool> marks(count, false);
-  for (const std::uint32_t i : which) marks[i] = true;
-  return marks;
-}
-
-std::vector<std::uint32_t> unmarked(const std::vector<bool>& marks) {
-  std::vector<std::uint32_t> rest;
-  for (std::uint32_t i = 0; i < marks.size(); ++i) {
-    if (!marks[i]) rest.push_back(i);
-  }
-  return rest;
-}
-
-/// Mass / step^2 + (1 + damping / step) stiffness, of the free nodes.
-Factor factorised(const Solid& solid, const std::vector<bool>& is_fixed,
-                  const std::vector<std::uint32_t>& free, const SoftSettings& settings) {
-  std::vector<std::uint32_t> row(is_fixed.size());
-  std::vector<MatrixEntry> entries;
-  for (std::uint32_t i = 0; i < free.size(); ++i) {
-    row[free[i]] = 3 * i;
-    const double mass = solid.masses()[free[i]];
-    if (!(mass > 0))
-      throw std::invalid_argument("node " + std::to_string(free[i] + 1) + " belongs to no element");
-    for (std::uint32_t c = 0; c < 3; ++c)
-      entries.push_back({3 * i + c, 3 * i + c, mass / (settings.step * settings.step)});
-  }
-  const double scale = 1 + settings.material.damping / settings.step;
-  for (const Solid::Block& block : solid.stiffness()) {
-    if (is_fixed[block.row] || is_fixed[block.column]) continue;
-    for (std::uint32_t i = 0; i < 3; ++i) {
-      for (std::uint32_t j = 0; j < 3; ++j) {
-        entries.push_back(
-            {row[block.row] + i, row[block.column] + j, scale * block.value[3 * i + j]});
-      }
-    }
-  }
-  return {3 * free.size(), entries};
-}
-
-}  // namespace
-
 SoftBody::SoftBody(stimuli::SolidMesh mesh, const std::vector<std::uint32_t>& fixed,
                    const SoftSettings& settings)
     : mesh_(std::move(mesh)),
@@ -708,29 +747,6 @@ void SoftBody::find_trial_gradient(SoftState& state) const noexcept {
 
 // One step of a soft body: quasi-Newton with a guard.
 
-namespace {
-
-constexpr double kArmijo = 1e-4;  // of the decrease predicted by the slope
-constexpr int kHalvings = 30;
-constexpr double kRounding = 1e-14;  // of the energy: less is not an increase
-// The quadratic model is trusted if a whole step lowers the potential by between this share of the
-// predicted decrease and 1 / it. Otherwise another iteration is worth its time.
-constexpr double kTrusted = 0.9;
-
-double longest(const std::vector<Vec3>& ways) {
-  double square = 0;
-  for (const Vec3& way : ways) square = std::max(square, glm::dot(way, way));
-  return std::sqrt(square);
-}
-
-double dot(const std::vector<Vec3>& a, const std::vector<Vec3>& b) {
-  double sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += glm::dot(a[i], b[i]);
-  return sum;
-}
-
-}  // namespace
-
 /// m, motion of the whole body in a step if nothing holds it: the minimisation must not remove its
 /// momentum.
 Vec3 SoftBody::rigid_way(const SoftState& state) const noexcept {
@@ -810,35 +826,6 @@ void SoftBody::step(SoftState& state, std::span<const NodeForce> forces) const n
   }
   look_ahead(state);
 }
-
-namespace {
-
-constexpr std::size_t kClusterTriangles = 16;
-
-/// Halves a list of items with places along their longest extent.
-void halve(std::vector<std::uint32_t>& order, std::size_t from, std::size_t to,
-           const std::vector<Vec3>& places, std::vector<std::size_t>& ends) {
-  if (to - from <= kClusterTriangles) {
-    ends.push_back(to);
-    return;
-  }
-  Vec3 low(std::numeric_limits<double>::infinity()), high = -low;
-  for (std::size_t i = from; i < to; ++i) {
-    low = glm::min(low, places[order[i]]);
-    high = glm::max(high, places[order[i]]);
-  }
-  const Vec3 size = high - low;
-  const int axis = size.x >= size.y && size.x >= size.z ? 0 : (size.y >= size.z ? 1 : 2);
-  std::stable_sort(
-      order.begin() + static_cast<std::ptrdiff_t>(from),
-      order.begin() + static_cast<std::ptrdiff_t>(to),
-      [&](std::uint32_t a, std::uint32_t b) { return places[a][axis] < places[b][axis]; });
-  const std::size_t middle = from + (to - from) / 2;
-  halve(order, from, middle, places, ends);
-  halve(order, middle, to, places, ends);
-}
-
-}  // namespace
 
 SoftSurface::SoftSurface(const SoftBody& body) {
   const auto& surface = body.surface();

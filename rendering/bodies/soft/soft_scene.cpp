@@ -260,52 +260,6 @@ void add_node_forces(SoftContactMemory& memory) {
   }
 }
 
-}  // namespace
-
-SoftContactMemory::SoftContactMemory(const SoftBody& body, const SoftContactSettings& settings) {
-  contacts.reserve(settings.most);
-  found.reserve(settings.most);
-  forces.reserve(3 * settings.most);
-  local.reserve(body.surface_nodes().size());
-  slot.assign(body.surface_nodes().size(), 0);
-  matrix.resize(settings.most * settings.most);
-}
-
-Vec3 follow_surface(const SoftMoment& moment, const SoftContactSettings& settings, const Vec3& tip,
-                    const PlacedTool& tool, double step, SoftContactMemory& memory) noexcept {
-  Search(moment, settings, tip, tool, step, memory).run();
-  const double spring = 1 / settings.stiffness;
-  prepare(moment.body, spring, memory);
-  solve_contacts(memory.found, memory.matrix, settings.sweeps);
-  Vec3 force(0);
-  for (const SoftContact& contact : memory.found) force += contact.force * contact.normal;
-  if (!std::isfinite(force.x + force.y + force.z)) {
-    memory.found.clear();
-    force = Vec3(0);
-  }
-  add_node_forces(memory);
-  memory.shift = spring * force;
-  std::swap(memory.contacts, memory.found);
-  return force;
-}
-
-bool is_inside(const SoftMoment& moment, double radius, const Vec3& tip,
-               const PlacedTool& tool) noexcept {
-  for (std::size_t s = 0; s < tool.count; ++s) {
-    const Segment axis{tip + tool.segments[s].from, tool.segments[s].along};
-    double turns = 0;  // solid angle of the surface, seen from the segment's start
-    for (const auto& [i, j, k] : moment.surface.triangles()) {
-      const auto& x = moment.view.x;
-      if (distance_to_triangle(axis, x[i], x[j], x[k]) < radius) return true;
-      turns += solid_angle(axis.from, x[i], x[j], x[k]);
-    }
-    if (turns > 6) return true;  // 4 pi inside, 0 outside
-  }
-  return false;
-}
-
-namespace {
-
 constexpr double kEarly = 1e-9;        // s; sums of ticks fall short of a step by rounding
 constexpr double kFarthestAhead = 2;   // steps beyond the view, covered by clusters' boxes
 constexpr double kFarthestNode = 1e3;  // m
@@ -347,86 +301,6 @@ void take_due_step(const SoftObject& object, SoftObjectState& state) {
   take_step(object, state);
   if (state.pace == SoftPace::this_tick) state.pace = SoftPace::hold;
 }
-
-}  // namespace
-
-double SoftObject::node_spacing() const {
-  double area = 0;
-  for (const auto& [i, j, k] : surface.triangles())
-    area += 0.5 * glm::length(glm::cross(rest[j] - rest[i], rest[k] - rest[i]));
-  return std::sqrt(area / static_cast<double>(rest.size()));
-}
-
-SoftObjectState initial_state(const SoftObject& object) {
-  SoftObjectState state;
-  state.body = object.body->rest();
-  state.view = object.surface.first_view(*object.body, state.body);
-  state.contact = SoftContactMemory(*object.body, object.contact);
-  state.impulse.assign(object.body->surface_nodes().size(), Vec3(0));
-  state.impelled.reserve(2 * state.impulse.size());
-  state.mean.reserve(2 * state.impulse.size());
-  return state;
-}
-
-void keep_room(const SoftObjectState& original, SoftObjectState& copy) {
-  copy.contact.contacts.reserve(original.contact.contacts.capacity());
-  copy.contact.found.reserve(original.contact.found.capacity());
-  copy.contact.forces.reserve(original.contact.forces.capacity());
-  copy.contact.local.reserve(original.contact.local.capacity());
-  copy.impelled.reserve(original.impelled.capacity());
-  copy.mean.reserve(original.mean.capacity());
-}
-
-bool step_is_due(const SoftObject& object, const SoftObjectState& state, double dt) noexcept {
-  return state.waiting &&
-         state.since_step + dt >= object.delay * object.body->settings().step - kEarly;
-}
-
-bool is_stalled(const SoftObjectState& state) noexcept {
-  return state.waiting && state.since_step > kStalledAfter;
-}
-
-bool step_and_look(const SoftObject& object, SoftState& body, std::span<const NodeForce> forces,
-                   SoftView& view) noexcept {
-  object.body->step(body, forces);
-  object.surface.look(*object.body, body, view);
-  double most = 0;
-  bool numbers = std::isfinite(body.energy);
-  for (std::size_t i = 0; i < view.x.size(); ++i) {
-    const Vec3& x = view.x[i];
-    const Vec3& ahead = view.ahead[i];
-    numbers = numbers && std::isfinite(x.x + x.y + x.z + ahead.x + ahead.y + ahead.z);
-    most = std::max({most, std::abs(x.x), std::abs(x.y), std::abs(x.z)});
-  }
-  return numbers && most <= kFarthestNode;
-}
-
-Vec3 advance(const SoftObject& object, SoftObjectState& state, const Vec3& tip,
-             const PlacedTool& tool, double step, double dt) noexcept {
-  const double h = object.body->settings().step;
-  state.since_step += dt;
-  state.view_age += dt;
-  take_due_step(object, state);
-  if (state.failed) return Vec3(0);
-  const double fraction = std::min(state.view_age / h, kFarthestAhead);
-  const SoftMoment moment{*object.body, object.surface, state.view, fraction};
-  Vec3 force(0);
-  if (!state.started || state.off) {
-    const bool inside = is_inside(moment, object.contact.radius, tip, tool);
-    state.off = inside;
-    state.started = true;
-  }
-  if (!state.off) force = follow_surface(moment, object.contact, tip, tool, step, state.contact);
-  add_impulse(state, dt);
-  // Wait for a late step: the next one gets the mean force of the whole time.
-  if (!state.waiting && state.since_step >= h - kEarly) {
-    ask_for_step(state);
-    if (object.delay * h <= kEarly) take_due_step(object, state);
-  }
-  return force;
-}
-
-namespace {
 
 constexpr double kShare = 0.25;                                  // of the time between two steps
 constexpr std::array kRates{1000.0, 500.0, 250.0, 125.0, 62.5};  // Hz
@@ -612,41 +486,6 @@ Meshed meshed(const stimuli::ObjectSpec& spec, const SoftSettings& settings) {
                        " or a stiffer material"));
 }
 
-}  // namespace
-
-bool coupling_is_stable(const SoftMaterial& material, double rate) {
-  for (const LeastRate& least : kLeastRates) {
-    if (material.young < least.below_young)
-      return rate >= (material.damping < kHardlyDamped ? least.undamped : least.damped);
-  }
-  return true;
-}
-
-double step_cost(std::size_t hexahedra, std::size_t tetrahedra, std::size_t factor_entries) {
-  return 2 * (7e-7 * static_cast<double>(hexahedra) + 5e-7 * static_cast<double>(tetrahedra) +
-              1e-9 * static_cast<double>(factor_entries));
-}
-
-std::shared_ptr<const SoftObject> build_soft_object(const stimuli::ObjectSpec& spec,
-                                                    const Pose& pose, const SoftTouch& touch) {
-  const stimuli::Soft& soft = *spec.soft;
-  SoftSettings settings{.material = {soft.young, soft.poisson, soft.density, soft.damping},
-                        .gravity = touch.gravity};
-  try {
-    Meshed found = meshed(spec, settings);
-    for (Vec3& node : found.mesh.nodes) node = pose.orientation * node + pose.position;
-    settings.step = 1 / found.rate.rate;
-    return std::make_shared<const SoftObject>(
-        std::make_shared<const SoftBody>(std::move(found.mesh), found.fixed, settings),
-        SoftContactSettings{.radius = touch.radius, .stiffness = spec.material.stiffness},
-        touch.object);
-  } catch (const std::invalid_argument& error) {
-    refuse(std::string("/soft: ") + error.what());
-  }
-}
-
-namespace {
-
 constexpr double kLongestTick = 0.001;   // s; longer ticks are split, with the hand moving evenly
 constexpr double kStride = 0.5;          // of the radius; the tool's motion in a piece of a tick
 constexpr int kMostPieces = 10'000;      // a gap of more than 10 s in a path counts as 10 s
@@ -826,6 +665,155 @@ const SoftMotion* soft_motion(const Scene& scene) {
 }
 
 }  // namespace
+
+SoftContactMemory::SoftContactMemory(const SoftBody& body, const SoftContactSettings& settings) {
+  contacts.reserve(settings.most);
+  found.reserve(settings.most);
+  forces.reserve(3 * settings.most);
+  local.reserve(body.surface_nodes().size());
+  slot.assign(body.surface_nodes().size(), 0);
+  matrix.resize(settings.most * settings.most);
+}
+
+Vec3 follow_surface(const SoftMoment& moment, const SoftContactSettings& settings, const Vec3& tip,
+                    const PlacedTool& tool, double step, SoftContactMemory& memory) noexcept {
+  Search(moment, settings, tip, tool, step, memory).run();
+  const double spring = 1 / settings.stiffness;
+  prepare(moment.body, spring, memory);
+  solve_contacts(memory.found, memory.matrix, settings.sweeps);
+  Vec3 force(0);
+  for (const SoftContact& contact : memory.found) force += contact.force * contact.normal;
+  if (!std::isfinite(force.x + force.y + force.z)) {
+    memory.found.clear();
+    force = Vec3(0);
+  }
+  add_node_forces(memory);
+  memory.shift = spring * force;
+  std::swap(memory.contacts, memory.found);
+  return force;
+}
+
+bool is_inside(const SoftMoment& moment, double radius, const Vec3& tip,
+               const PlacedTool& tool) noexcept {
+  for (std::size_t s = 0; s < tool.count; ++s) {
+    const Segment axis{tip + tool.segments[s].from, tool.segments[s].along};
+    double turns = 0;  // solid angle of the surface, seen from the segment's start
+    for (const auto& [i, j, k] : moment.surface.triangles()) {
+      const auto& x = moment.view.x;
+      if (distance_to_triangle(axis, x[i], x[j], x[k]) < radius) return true;
+      turns += solid_angle(axis.from, x[i], x[j], x[k]);
+    }
+    if (turns > 6) return true;  // 4 pi inside, 0 outside
+  }
+  return false;
+}
+
+double SoftObject::node_spacing() const {
+  double area = 0;
+  for (const auto& [i, j, k] : surface.triangles())
+    area += 0.5 * glm::length(glm::cross(rest[j] - rest[i], rest[k] - rest[i]));
+  return std::sqrt(area / static_cast<double>(rest.size()));
+}
+
+SoftObjectState initial_state(const SoftObject& object) {
+  SoftObjectState state;
+  state.body = object.body->rest();
+  state.view = object.surface.first_view(*object.body, state.body);
+  state.contact = SoftContactMemory(*object.body, object.contact);
+  state.impulse.assign(object.body->surface_nodes().size(), Vec3(0));
+  state.impelled.reserve(2 * state.impulse.size());
+  state.mean.reserve(2 * state.impulse.size());
+  return state;
+}
+
+void keep_room(const SoftObjectState& original, SoftObjectState& copy) {
+  copy.contact.contacts.reserve(original.contact.contacts.capacity());
+  copy.contact.found.reserve(original.contact.found.capacity());
+  copy.contact.forces.reserve(original.contact.forces.capacity());
+  copy.contact.local.reserve(original.contact.local.capacity());
+  copy.impelled.reserve(original.impelled.capacity());
+  copy.mean.reserve(original.mean.capacity());
+}
+
+bool step_is_due(const SoftObject& object, const SoftObjectState& state, double dt) noexcept {
+  return state.waiting &&
+         state.since_step + dt >= object.delay * object.body->settings().step - kEarly;
+}
+
+bool is_stalled(const SoftObjectState& state) noexcept {
+  return state.waiting && state.since_step > kStalledAfter;
+}
+
+bool step_and_look(const SoftObject& object, SoftState& body, std::span<const NodeForce> forces,
+                   SoftView& view) noexcept {
+  object.body->step(body, forces);
+  object.surface.look(*object.body, body, view);
+  double most = 0;
+  bool numbers = std::isfinite(body.energy);
+  for (std::size_t i = 0; i < view.x.size(); ++i) {
+    const Vec3& x = view.x[i];
+    const Vec3& ahead = view.ahead[i];
+    numbers = numbers && std::isfinite(x.x + x.y + x.z + ahead.x + ahead.y + ahead.z);
+    most = std::max({most, std::abs(x.x), std::abs(x.y), std::abs(x.z)});
+  }
+  return numbers && most <= kFarthestNode;
+}
+
+Vec3 advance(const SoftObject& object, SoftObjectState& state, const Vec3& tip,
+             const PlacedTool& tool, double step, double dt) noexcept {
+  const double h = object.body->settings().step;
+  state.since_step += dt;
+  state.view_age += dt;
+  take_due_step(object, state);
+  if (state.failed) return Vec3(0);
+  const double fraction = std::min(state.view_age / h, kFarthestAhead);
+  const SoftMoment moment{*object.body, object.surface, state.view, fraction};
+  Vec3 force(0);
+  if (!state.started || state.off) {
+    const bool inside = is_inside(moment, object.contact.radius, tip, tool);
+    state.off = inside;
+    state.started = true;
+  }
+  if (!state.off) force = follow_surface(moment, object.contact, tip, tool, step, state.contact);
+  add_impulse(state, dt);
+  // Wait for a late step: the next one gets the mean force of the whole time.
+  if (!state.waiting && state.since_step >= h - kEarly) {
+    ask_for_step(state);
+    if (object.delay * h <= kEarly) take_due_step(object, state);
+  }
+  return force;
+}
+
+bool coupling_is_stable(const SoftMaterial& material, double rate) {
+  for (const LeastRate& least : kLeastRates) {
+    if (material.young < least.below_young)
+      return rate >= (material.damping < kHardlyDamped ? least.undamped : least.damped);
+  }
+  return true;
+}
+
+double step_cost(std::size_t hexahedra, std::size_t tetrahedra, std::size_t factor_entries) {
+  return 2 * (7e-7 * static_cast<double>(hexahedra) + 5e-7 * static_cast<double>(tetrahedra) +
+              1e-9 * static_cast<double>(factor_entries));
+}
+
+std::shared_ptr<const SoftObject> build_soft_object(const stimuli::ObjectSpec& spec,
+                                                    const Pose& pose, const SoftTouch& touch) {
+  const stimuli::Soft& soft = *spec.soft;
+  SoftSettings settings{.material = {soft.young, soft.poisson, soft.density, soft.damping},
+                        .gravity = touch.gravity};
+  try {
+    Meshed found = meshed(spec, settings);
+    for (Vec3& node : found.mesh.nodes) node = pose.orientation * node + pose.position;
+    settings.step = 1 / found.rate.rate;
+    return std::make_shared<const SoftObject>(
+        std::make_shared<const SoftBody>(std::move(found.mesh), found.fixed, settings),
+        SoftContactSettings{.radius = touch.radius, .stiffness = spec.material.stiffness},
+        touch.object);
+  } catch (const std::invalid_argument& error) {
+    refuse(std::string("/soft: ") + error.what());
+  }
+}
 
 Scene soft_scene(Scene others, std::vector<SceneObject> shown,
                  std::vector<std::shared_ptr<const SoftObject>> soft, bool side_contact,

@@ -19,22 +19,6 @@
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::commands {
-
-// The measurements of `palpate accuracy`. Shows progress on a terminal.
-
-/// Runs the randomised search, at least `ticks` ticks, with the walks distributed among threads;
-/// the sums do not depend on the distribution.
-rendering::SearchCounts search_in_threads(std::uint64_t ticks, std::uint64_t seed, int jobs);
-
-/// The same search over unions of convex parts and tools.
-rendering::UnionCounts search_unions_in_threads(std::uint64_t ticks, std::uint64_t seed, int jobs);
-
-/// Fills in the whole report, by report.settings: errors and run times, first contacts, unions,
-/// extreme cases, short searches.
-/// \param quick  skips the extreme case whose mesh takes seconds to build
-/// \param seed   of the searches
-void measure_accuracy(AccuracyReport& report, bool quick, int jobs, std::uint64_t seed);
-
 namespace {
 
 void study_first_contacts(AccuracyReport& report, int entries) {
@@ -140,16 +124,20 @@ Counts in_threads(Counts (*search)(std::uint64_t, std::uint64_t, std::uint64_t),
   return all;
 }
 
-}  // namespace
-
+// The measurements of `palpate accuracy`. Shows progress on a terminal.
 rendering::SearchCounts search_in_threads(std::uint64_t ticks, std::uint64_t seed, int jobs) {
   return in_threads(rendering::search_walks, ticks, seed, jobs);
 }
 
+/// The same search over unions of convex parts and tools.
 rendering::UnionCounts search_unions_in_threads(std::uint64_t ticks, std::uint64_t seed, int jobs) {
   return in_threads(rendering::search_unions, ticks, seed, jobs);
 }
 
+/// Fills in the whole report, by report.settings: errors and run times, first contacts, unions,
+/// extreme cases, short searches.
+/// \param quick  skips the extreme case whose mesh takes seconds to build
+/// \param seed   of the searches
 void measure_accuracy(AccuracyReport& report, bool quick, int jobs, std::uint64_t seed) {
   {
     ProgressLine progress("errors and times");
@@ -182,8 +170,6 @@ void measure_accuracy(AccuracyReport& report, bool quick, int jobs, std::uint64_
   report.search = search_in_threads(kShortSearch, seed, jobs);
   report.union_search = search_unions_in_threads(kShortSearch, seed, jobs);
 }
-
-namespace {
 
 rendering::AccuracySettings quick_settings() {
   rendering::AccuracySettings quick;

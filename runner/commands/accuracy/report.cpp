@@ -11,30 +11,6 @@
 #include "rendering/accuracy/peers.h"
 
 namespace palpate::runner::commands {
-
-std::string significant(double value) {
-  char text[32];
-  if (value != 0 && (std::abs(value) < 1e-3 || std::abs(value) >= 1e5)) {
-    std::snprintf(text, sizeof text, "%.1e", value);
-  } else {
-    std::snprintf(text, sizeof text, "%.3g", value);
-  }
-  return text;
-}
-
-std::string thousands(long long n) {
-  std::string digits = std::to_string(n);
-  for (int at = static_cast<int>(digits.size()) - 3; at > 0; at -= 3) {
-    digits.insert(static_cast<std::size_t>(at), ",");
-  }
-  return digits;
-}
-
-std::string share(std::size_t part, std::size_t all) {
-  return part == 0 ? "0"
-                   : significant(100.0 * static_cast<double>(part) / static_cast<double>(all));
-}
-
 namespace {
 
 constexpr double kDegree = std::numbers::pi / 180;
@@ -215,7 +191,83 @@ analysis::Table search_table(const rendering::SearchCounts& c, std::uint64_t see
   return table;
 }
 
+/// The measurements, the definitions of the numbers, and the methods.
+std::vector<std::string> how_to_read(const AccuracyReport& report) {
+  const rendering::AccuracySettings& s = report.settings;
+  std::vector<std::string> all;
+  all.emplace_back(
+      "Measured on " + std::to_string(s.paths) + " paths for each shape and probe, " +
+      std::to_string(s.contact_ticks) +
+      " ticks of contact each: a hand at 0.1 m/s, 1 to 2 mm deep, wandering over the shape "
+      "with a stylus of " +
+      significant(1e3 * s.length) + " mm (rendering/accuracy/analytic_stroke.h; seeds 1 to " +
+      std::to_string(s.paths) +
+      "). Sphere of radius 30 mm; cone and cylinder of radius 30 mm, 60 mm high; cube of 60 "
+      "mm; box of 80 x 60 x 40 mm. Forces at 800 N/m.");
+  all.emplace_back(
+      "A result is compared with the exact local minimum of the penetration depth that is nearest "
+      "to "
+      "it in direction: a god-object keeps to the side by which it entered, which need not be that "
+      "of least depth (\"not least\": such ticks). A lost contact counts with its whole depth and "
+      "force.");
+  all.emplace_back(
+      "Depths are along that direction, angles in degrees, forces and torques (about the tip) "
+      "differences of vectors, points on the ideal probe. Times are means over the ticks in "
+      "contact, the fastest of three runs, on this machine.");
+  all.emplace_back(
+      "Contact points and torques are compared where the stylus is more than 2 degrees off every "
+      "flat that it touches; closer, it is touched along a length and the contact point is a "
+      "convention (equation "
+      "(2)).");
+  all.emplace_back(
+      "Worst: about once in 10,000 ticks the contact on a tessellation leaves a side one tick "
+      "before "
+      "or after that on the shape does.");
+  for (const rendering::MethodDefinition& method : rendering::contact_methods()) {
+    std::string line = "Method ";
+    line += method.name;
+    line += ": ";
+    line += method.description;
+    all.push_back(line + ".");
+  }
+  for (const rendering::PeerLibrary& library : rendering::peer_libraries()) {
+    if (library.make) continue;
+    std::string line = "Method ";
+    line += library.name;
+    all.push_back(line + ": absent from this build (PALPATE_PEERS).");
+  }
+  return all;
+}
+
+constexpr const char* kQuestion =
+    "Which tessellation? The coarsest with 99.9 % of ticks below what a hand can feel (force "
+    "direction 10 degrees, surface position 1 mm), and below what a device resolves (0.03 mm); "
+    "point and ray.";
+
 }  // namespace
+
+std::string significant(double value) {
+  char text[32];
+  if (value != 0 && (std::abs(value) < 1e-3 || std::abs(value) >= 1e5)) {
+    std::snprintf(text, sizeof text, "%.1e", value);
+  } else {
+    std::snprintf(text, sizeof text, "%.3g", value);
+  }
+  return text;
+}
+
+std::string thousands(long long n) {
+  std::string digits = std::to_string(n);
+  for (int at = static_cast<int>(digits.size()) - 3; at > 0; at -= 3) {
+    digits.insert(static_cast<std::size_t>(at), ",");
+  }
+  return digits;
+}
+
+std::string share(std::size_t part, std::size_t all) {
+  return part == 0 ? "0"
+                   : significant(100.0 * static_cast<double>(part) / static_cast<double>(all));
+}
 
 std::string recommendation(const AccuracyReport& report, const std::string& shape) {
   const int hand = rendering::triangles_for(report.rows, shape, kHand);
@@ -403,63 +455,6 @@ analysis::Table body_table(const AccuracyReport& report) {
       " us.");
   return table;
 }
-
-namespace {
-
-/// The measurements, the definitions of the numbers, and the methods.
-std::vector<std::string> how_to_read(const AccuracyReport& report) {
-  const rendering::AccuracySettings& s = report.settings;
-  std::vector<std::string> all;
-  all.emplace_back(
-      "Measured on " + std::to_string(s.paths) + " paths for each shape and probe, " +
-      std::to_string(s.contact_ticks) +
-      " ticks of contact each: a hand at 0.1 m/s, 1 to 2 mm deep, wandering over the shape "
-      "with a stylus of " +
-      significant(1e3 * s.length) + " mm (rendering/accuracy/analytic_stroke.h; seeds 1 to " +
-      std::to_string(s.paths) +
-      "). Sphere of radius 30 mm; cone and cylinder of radius 30 mm, 60 mm high; cube of 60 "
-      "mm; box of 80 x 60 x 40 mm. Forces at 800 N/m.");
-  all.emplace_back(
-      "A result is compared with the exact local minimum of the penetration depth that is nearest "
-      "to "
-      "it in direction: a god-object keeps to the side by which it entered, which need not be that "
-      "of least depth (\"not least\": such ticks). A lost contact counts with its whole depth and "
-      "force.");
-  all.emplace_back(
-      "Depths are along that direction, angles in degrees, forces and torques (about the tip) "
-      "differences of vectors, points on the ideal probe. Times are means over the ticks in "
-      "contact, the fastest of three runs, on this machine.");
-  all.emplace_back(
-      "Contact points and torques are compared where the stylus is more than 2 degrees off every "
-      "flat that it touches; closer, it is touched along a length and the contact point is a "
-      "convention (equation "
-      "(2)).");
-  all.emplace_back(
-      "Worst: about once in 10,000 ticks the contact on a tessellation leaves a side one tick "
-      "before "
-      "or after that on the shape does.");
-  for (const rendering::MethodDefinition& method : rendering::contact_methods()) {
-    std::string line = "Method ";
-    line += method.name;
-    line += ": ";
-    line += method.description;
-    all.push_back(line + ".");
-  }
-  for (const rendering::PeerLibrary& library : rendering::peer_libraries()) {
-    if (library.make) continue;
-    std::string line = "Method ";
-    line += library.name;
-    all.push_back(line + ": absent from this build (PALPATE_PEERS).");
-  }
-  return all;
-}
-
-constexpr const char* kQuestion =
-    "Which tessellation? The coarsest with 99.9 % of ticks below what a hand can feel (force "
-    "direction 10 degrees, surface position 1 mm), and below what a device resolves (0.03 mm); "
-    "point and ray.";
-
-}  // namespace
 
 void put_wrapped(std::ostream& out, const std::string& text) {
   constexpr std::size_t kColumns = 98;

@@ -34,80 +34,6 @@ namespace {
 constexpr double kSoftInterval =
     0.015;  // s; a minute of every tick's surfaces would fill the memory
 
-}  // namespace
-
-display::SceneMoment moment_of(const TimedPose& pose, const protocols::SceneSpec& spec,
-                               const rendering::Scene& scene, const rendering::Rendering& rendering,
-                               const rendering::RenderState& state) {
-  display::SceneMoment out{.sample = {},
-                           .contacts = display::contact_places(scene, state, rendering)};
-  out.sample.time_ns = std::llround(pose.t * 1e9);
-  out.sample.probe = virtual_stylus(spec, pose.probe);
-  out.sample.rendering = rendering;
-  out.sample.faults = rendering.faults;
-  out.sample.device1 = rendering.device1;
-  out.sample.device2 = rendering.device2;
-  if (spec.reach) out.held = pose.probe;
-  out.poses = display::object_poses(spec.objects, state);
-  out.soft = display::soft_surfaces(scene, state);
-  return out;
-}
-
-RecordedTouch::RecordedTouch(std::string scene_path, protocols::SceneSpec spec,
-                             const rendering::Renderer& renderer, std::vector<TimedPose> poses)
-    : scene_path_(std::move(scene_path)),
-      spec_(std::move(spec)),
-      renderer_(renderer),
-      poses_(std::move(poses)) {
-  touch();
-}
-
-void RecordedTouch::touch() {
-  SceneBuilder builder;
-  const rendering::Scene scene = build_scene(builder, scene_path_, spec_, renderer_);
-  const std::size_t stride =
-      (poses_.size() + display::Timeline::kMost - 2) / (display::Timeline::kMost - 1);
-  std::size_t row = 0;
-  std::uint32_t faults = 0;
-  double soft_time = -1;  // of the surfaces that were kept last: fewer than there are ticks
-  std::vector<std::shared_ptr<const display::SoftSurfaceNow>> soft;
-  moments_.clear();
-  render_along(scene, spec_, renderer_, poses_,
-               [&](const TimedPose& pose, const rendering::Rendering& rendering,
-                   const rendering::RenderState& state) {
-                 faults |= rendering.faults;  // of rows that are not kept as well
-                 if (row++ % stride != 0) return;
-                 moments_.push_back(moment_of(pose, spec_, scene, rendering, state));
-                 moments_.back().sample.faults = std::exchange(faults, 0);
-                 if (pose.t >= soft_time && pose.t < soft_time + kSoftInterval && soft_time >= 0) {
-                   moments_.back().soft = soft;
-                 } else {
-                   soft = moments_.back().soft;
-                   soft_time = pose.t;
-                 }
-               });
-}
-
-void RecordedTouch::take(std::vector<display::SceneMoment>& out) {
-  out.insert(out.end(), std::make_move_iterator(moments_.begin()),
-             std::make_move_iterator(moments_.end()));
-  moments_.clear();
-}
-
-void RecordedTouch::show(const std::vector<stimuli::ObjectSpec>& objects) {
-  const std::vector<stimuli::ObjectSpec> before = std::exchange(spec_.objects, objects);
-  trouble_.clear();
-  try {
-    touch();
-  } catch (const std::exception& fault) {
-    trouble_ = fault.what();
-    spec_.objects = before;
-    touch();
-  }
-}
-
-namespace {
-
 namespace fs = std::filesystem;
 
 /// Keeps pictures as scene-1.png and so on, the first number that is free; clips likewise.
@@ -215,20 +141,6 @@ int explore_live(const protocols::SceneSpec& spec, const rendering::Renderer& re
   return 0;
 }
 
-}  // namespace
-
-int explore_hands_on(const protocols::SceneSpec& spec, const rendering::Renderer& renderer,
-                     const HandsOnSettings& settings) {
-  if (settings.trajectory.empty()) return explore_live(spec, renderer, settings);
-  RecordedTouch touch(settings.scene_path, spec, renderer, read_trajectory(settings.trajectory));
-  display::ExploreSettings window = window_settings(spec, renderer, settings);
-  window.end_requested = [&stop = catch_stop_signals()] { return stop.load(); };
-  display::explore_in_window(std::move(window), touch);
-  return 0;
-}
-
-namespace {
-
 constexpr auto kIdle = std::chrono::milliseconds(5);
 constexpr std::int64_t kSoftEvery = 15'000'000;  // ns, between two surfaces that are kept
 
@@ -240,6 +152,86 @@ servo::ServoSettings with_places(servo::ServoSettings settings) {
 constexpr servo::HomeZone kAnywhere{.radius = 0, .rest = 0};
 
 }  // namespace
+
+display::SceneMoment moment_of(const TimedPose& pose, const protocols::SceneSpec& spec,
+                               const rendering::Scene& scene, const rendering::Rendering& rendering,
+                               const rendering::RenderState& state) {
+  display::SceneMoment out{.sample = {},
+                           .contacts = display::contact_places(scene, state, rendering)};
+  out.sample.time_ns = std::llround(pose.t * 1e9);
+  out.sample.probe = virtual_stylus(spec, pose.probe);
+  out.sample.rendering = rendering;
+  out.sample.faults = rendering.faults;
+  out.sample.device1 = rendering.device1;
+  out.sample.device2 = rendering.device2;
+  if (spec.reach) out.held = pose.probe;
+  out.poses = display::object_poses(spec.objects, state);
+  out.soft = display::soft_surfaces(scene, state);
+  return out;
+}
+
+RecordedTouch::RecordedTouch(std::string scene_path, protocols::SceneSpec spec,
+                             const rendering::Renderer& renderer, std::vector<TimedPose> poses)
+    : scene_path_(std::move(scene_path)),
+      spec_(std::move(spec)),
+      renderer_(renderer),
+      poses_(std::move(poses)) {
+  touch();
+}
+
+void RecordedTouch::touch() {
+  SceneBuilder builder;
+  const rendering::Scene scene = build_scene(builder, scene_path_, spec_, renderer_);
+  const std::size_t stride =
+      (poses_.size() + display::Timeline::kMost - 2) / (display::Timeline::kMost - 1);
+  std::size_t row = 0;
+  std::uint32_t faults = 0;
+  double soft_time = -1;  // of the surfaces that were kept last: fewer than there are ticks
+  std::vector<std::shared_ptr<const display::SoftSurfaceNow>> soft;
+  moments_.clear();
+  render_along(scene, spec_, renderer_, poses_,
+               [&](const TimedPose& pose, const rendering::Rendering& rendering,
+                   const rendering::RenderState& state) {
+                 faults |= rendering.faults;  // of rows that are not kept as well
+                 if (row++ % stride != 0) return;
+                 moments_.push_back(moment_of(pose, spec_, scene, rendering, state));
+                 moments_.back().sample.faults = std::exchange(faults, 0);
+                 if (pose.t >= soft_time && pose.t < soft_time + kSoftInterval && soft_time >= 0) {
+                   moments_.back().soft = soft;
+                 } else {
+                   soft = moments_.back().soft;
+                   soft_time = pose.t;
+                 }
+               });
+}
+
+void RecordedTouch::take(std::vector<display::SceneMoment>& out) {
+  out.insert(out.end(), std::make_move_iterator(moments_.begin()),
+             std::make_move_iterator(moments_.end()));
+  moments_.clear();
+}
+
+void RecordedTouch::show(const std::vector<stimuli::ObjectSpec>& objects) {
+  const std::vector<stimuli::ObjectSpec> before = std::exchange(spec_.objects, objects);
+  trouble_.clear();
+  try {
+    touch();
+  } catch (const std::exception& fault) {
+    trouble_ = fault.what();
+    spec_.objects = before;
+    touch();
+  }
+}
+
+int explore_hands_on(const protocols::SceneSpec& spec, const rendering::Renderer& renderer,
+                     const HandsOnSettings& settings) {
+  if (settings.trajectory.empty()) return explore_live(spec, renderer, settings);
+  RecordedTouch touch(settings.scene_path, spec, renderer, read_trajectory(settings.trajectory));
+  display::ExploreSettings window = window_settings(spec, renderer, settings);
+  window.end_requested = [&stop = catch_stop_signals()] { return stop.load(); };
+  display::explore_in_window(std::move(window), touch);
+  return 0;
+}
 
 LiveTouch::LiveTouch(servo::Device& device, servo::Clock& clock, Settings settings)
     : settings_(std::move(settings)),

@@ -137,10 +137,6 @@ void put_row(CsvText& csv, const TrialRow& one, const analysis::MovementSettings
   csv.end_row();
 }
 
-}  // namespace
-
-namespace {
-
 /// Reads the typical trials again, and the surfaces of their objects.
 void add_pictures(const MovementRequest& request, StudyStimuli& stimuli,
                   const std::vector<TrialRow>& rows, MovementStudy& study) {

@@ -80,6 +80,69 @@ std::vector<Vec3> places_of(const rendering::Scene& scene) {
   return places;
 }
 
+/// A tick in the object's frame.
+struct TouchedTick {
+  Vec3 tip;
+  bool contact = false, on_edge = false;
+  Vec3 point, normal, force;  ///< of the deepest contact
+  std::array<Vec3, 2> touched;
+};
+
+void put(analysis::MovementTrial& trial, const TouchedTick& tick, bool has_edges) {
+  trial.tip.push_back(tick.tip);
+  trial.contact.push_back(tick.contact);
+  trial.point.push_back(tick.point);
+  trial.normal.push_back(tick.normal);
+  trial.force.push_back(tick.force);
+  trial.touched.push_back(tick.touched);
+  if (has_edges) trial.on_edge.push_back(tick.on_edge);
+}
+
+void reserve(analysis::MovementTrial& trial, std::size_t ticks) {
+  for (auto* vectors : {&trial.tip, &trial.point, &trial.normal, &trial.force})
+    vectors->reserve(ticks);
+  trial.touched.reserve(ticks);
+  trial.contact.reserve(ticks);
+  trial.on_edge.reserve(ticks);
+}
+
+/// Interpolates a missed tick linearly between its neighbours; in contact if both are.
+TouchedTick between(const TouchedTick& before, const TouchedTick& after, double share) {
+  TouchedTick tick;
+  tick.tip = glm::mix(before.tip, after.tip, share);
+  tick.contact = before.contact && after.contact;
+  if (!tick.contact) return tick;
+  const Vec3 normal = glm::mix(before.normal, after.normal, share);
+  const double length = glm::length(normal);
+  tick.normal = length > 0 ? normal / length : before.normal;
+  tick.point = glm::mix(before.point, after.point, share);
+  tick.force = glm::mix(before.force, after.force, share);
+  tick.touched = {tick.point, tick.point};
+  tick.on_edge = before.on_edge && after.on_edge;
+  return tick;
+}
+
+/// Whether a level leaves shape, size and orientation as they are: materials only.
+bool keeps_geometry(const protocols::Protocol& protocol, const data::TaskRecord& task) {
+  const auto block =
+      std::ranges::find(protocol.blocks, task.block_name, &protocols::TaskBlock::name);
+  if (block == protocol.blocks.end() || !block->level) return true;
+  const std::string& path = block->level->pointer;
+  const std::string last = path.substr(path.rfind('/') + 1);
+  return last.starts_with("stiffness_") || last.starts_with("damping_") ||
+         last.starts_with("friction_");
+}
+
+/// Reason why a trial of a block has no measures; empty: it has one interval with the stimulus as
+/// the protocol describes its surface.
+std::string unmeasured_task(const protocols::Protocol& protocol, const data::TrialRecord& record) {
+  const std::vector<data::IntervalRecord> intervals = data::intervals_of(record);
+  if (intervals.size() != 1) return "a trial of several intervals";
+  if (intervals[0].stimulus.empty()) return "a trial without an object";
+  if (intervals[0].stimulus != record.shape) return "a trial with the object of catch trials";
+  return keeps_geometry(protocol, record.task) ? "" : "its level changes the shape of the object";
+}
+
 }  // namespace
 
 TouchedStimuli::TouchedStimuli(protocols::Protocol protocol)
@@ -154,52 +217,6 @@ int TouchedStimuli::stimulus(const std::string& name) const {
   return found == all.end() ? -1 : static_cast<int>(found - all.begin());
 }
 
-namespace {
-
-/// A tick in the object's frame.
-struct TouchedTick {
-  Vec3 tip;
-  bool contact = false, on_edge = false;
-  Vec3 point, normal, force;  ///< of the deepest contact
-  std::array<Vec3, 2> touched;
-};
-
-void put(analysis::MovementTrial& trial, const TouchedTick& tick, bool has_edges) {
-  trial.tip.push_back(tick.tip);
-  trial.contact.push_back(tick.contact);
-  trial.point.push_back(tick.point);
-  trial.normal.push_back(tick.normal);
-  trial.force.push_back(tick.force);
-  trial.touched.push_back(tick.touched);
-  if (has_edges) trial.on_edge.push_back(tick.on_edge);
-}
-
-void reserve(analysis::MovementTrial& trial, std::size_t ticks) {
-  for (auto* vectors : {&trial.tip, &trial.point, &trial.normal, &trial.force})
-    vectors->reserve(ticks);
-  trial.touched.reserve(ticks);
-  trial.contact.reserve(ticks);
-  trial.on_edge.reserve(ticks);
-}
-
-/// Interpolates a missed tick linearly between its neighbours; in contact if both are.
-TouchedTick between(const TouchedTick& before, const TouchedTick& after, double share) {
-  TouchedTick tick;
-  tick.tip = glm::mix(before.tip, after.tip, share);
-  tick.contact = before.contact && after.contact;
-  if (!tick.contact) return tick;
-  const Vec3 normal = glm::mix(before.normal, after.normal, share);
-  const double length = glm::length(normal);
-  tick.normal = length > 0 ? normal / length : before.normal;
-  tick.point = glm::mix(before.point, after.point, share);
-  tick.force = glm::mix(before.force, after.force, share);
-  tick.touched = {tick.point, tick.point};
-  tick.on_edge = before.on_edge && after.on_edge;
-  return tick;
-}
-
-}  // namespace
-
 std::shared_ptr<const TouchedStimuli> StudyStimuli::of(data::Store& store,
                                                        const data::StoredTrial& trial) {
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -217,31 +234,6 @@ std::shared_ptr<const TouchedStimuli> StudyStimuli::of(data::Store& store,
   if (!limited) by_protocol_[sha] = made;
   return by_run_[run] = made;
 }
-
-namespace {
-
-/// Whether a level leaves shape, size and orientation as they are: materials only.
-bool keeps_geometry(const protocols::Protocol& protocol, const data::TaskRecord& task) {
-  const auto block =
-      std::ranges::find(protocol.blocks, task.block_name, &protocols::TaskBlock::name);
-  if (block == protocol.blocks.end() || !block->level) return true;
-  const std::string& path = block->level->pointer;
-  const std::string last = path.substr(path.rfind('/') + 1);
-  return last.starts_with("stiffness_") || last.starts_with("damping_") ||
-         last.starts_with("friction_");
-}
-
-/// Reason why a trial of a block has no measures; empty: it has one interval with the stimulus as
-/// the protocol describes its surface.
-std::string unmeasured_task(const protocols::Protocol& protocol, const data::TrialRecord& record) {
-  const std::vector<data::IntervalRecord> intervals = data::intervals_of(record);
-  if (intervals.size() != 1) return "a trial of several intervals";
-  if (intervals[0].stimulus.empty()) return "a trial without an object";
-  if (intervals[0].stimulus != record.shape) return "a trial with the object of catch trials";
-  return keeps_geometry(protocol, record.task) ? "" : "its level changes the shape of the object";
-}
-
-}  // namespace
 
 std::string read_movement(const TouchedStimuli& stimuli, const data::StoredTrial& stored,
                           analysis::MovementTrial& trial) {

@@ -50,6 +50,20 @@ std::optional<std::array<double, kPoseColumns + kSideColumns>> numbers_of(
   return out;
 }
 
+rendering::Reach reach_for(const protocols::ReachSpec& spec, const rendering::LineProbe& real) {
+  constexpr double kGrip = protocols::Protocol::Stylus{}.grip;  // as where a protocol does not say
+  return reach_of(spec, glm::distance(real.tip, real.tail), kGrip);
+}
+
+/// One tick of a stylus with an extended reach.
+rendering::Rendering extended_tick(const rendering::Scene& scene, rendering::RenderState& state,
+                                   const rendering::Renderer& renderer,
+                                   const protocols::ReachSpec& spec,
+                                   const rendering::LineProbe& real, double dt) {
+  const rendering::Reach reach = reach_for(spec, real);
+  return felt(reach, renderer.tick(scene, state, stretched(reach, real), dt));
+}
+
 }  // namespace
 
 std::string fault_of(const TimedPose& pose, const std::vector<TimedPose>& before) {
@@ -179,24 +193,6 @@ void BodyTable::add(double t, std::span<const rendering::BodyPose> bodies) {
     csv_.end_row();
   }
 }
-
-namespace {
-
-rendering::Reach reach_for(const protocols::ReachSpec& spec, const rendering::LineProbe& real) {
-  constexpr double kGrip = protocols::Protocol::Stylus{}.grip;  // as where a protocol does not say
-  return reach_of(spec, glm::distance(real.tip, real.tail), kGrip);
-}
-
-/// One tick of a stylus with an extended reach.
-rendering::Rendering extended_tick(const rendering::Scene& scene, rendering::RenderState& state,
-                                   const rendering::Renderer& renderer,
-                                   const protocols::ReachSpec& spec,
-                                   const rendering::LineProbe& real, double dt) {
-  const rendering::Reach reach = reach_for(spec, real);
-  return felt(reach, renderer.tick(scene, state, stretched(reach, real), dt));
-}
-
-}  // namespace
 
 const rendering::Renderer& renderer_named(const std::string& name) {
   if (name != "point" && name != "ray")

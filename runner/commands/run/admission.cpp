@@ -86,20 +86,6 @@ bool a_letter_away(const std::string& a, const std::string& b) {
   return letters >= kTelling && one_changed_or_two_swapped(x.letters, y.letters);
 }
 
-}  // namespace
-
-std::vector<std::string> near_codes(const std::string& code,
-                                    const std::vector<std::string>& known) {
-  std::vector<std::string> near;
-  for (const std::string& other : known) {
-    if (other == code) continue;
-    if (read_alike(other) == read_alike(code) || a_letter_away(other, code)) near.push_back(other);
-  }
-  return near;
-}
-
-namespace {
-
 constexpr std::int64_t kSecond_ns = 1'000'000'000;
 constexpr std::string_view kEndNote = "ended: ";  // of the run, with the reason, at that moment
 
@@ -179,104 +165,6 @@ void check_withdrawal(data::Store& store, const data::Participant& participant, 
     throw_withdrawn(code, when);
   }
 }
-
-}  // namespace
-
-std::string spoken_time(std::int64_t utc_ns, std::int64_t now_utc_ns) {
-  const std::tm then = local(utc_ns), today = local(now_utc_ns);
-  std::tm before = today;  // the day, whatever the hour and however long a day is
-  before.tm_mday -= 1;
-  before.tm_hour = 12;
-  before.tm_isdst = -1;
-  std::mktime(&before);
-  const std::string day = in_format(then, "%Y-%m-%d"), clock = in_format(then, " %H:%M");
-  if (day == in_format(today, "%Y-%m-%d")) return "today" + clock;
-  if (day == in_format(before, "%Y-%m-%d")) return "yesterday" + clock;
-  return day + clock;
-}
-
-std::string resumption(data::Store& store, const data::Participant& participant, int session,
-                       const session::SessionPlan& plan) {
-  const std::optional<data::StoredRun> last = newest_run(store, [&](const data::StoredRun& run) {
-    return run.participant.id == participant.id && run.info.session == session;
-  });
-  if (participant.id == 0 || !last) return "";
-  std::string text = std::to_string(plan.done()) + " of " + std::to_string(plan.size()) +
-                     " trials done, last run " + spoken_time(last->info.clock.utc_ns, utc_now()) +
-                     " (" + data::to_string(last->end) + ")";
-  if (!plan.finished()) text += ", continues with trial " + std::to_string(plan.next().trial);
-  return text;
-}
-
-std::string withdrawn_when(data::Store& store, const std::string& code) {
-  const std::optional<data::StoredRun> last = newest_run(
-      store, [&code](const data::StoredRun& run) { return run.participant.code == code; });
-  if (!last || last->end != data::RunEnd::withdrawn) return "";
-  std::int64_t when_ns = last->info.clock.utc_ns;
-  for (const data::StoredNote& note : store.notes()) {
-    const bool of_that_run =
-        note.participant.code == code && note.run_clock.utc_ns == last->info.clock.utc_ns;
-    if (of_that_run && note.text.starts_with(kEndNote)) when_ns = utc_of(note.utc);
-  }
-  return spoken_time(when_ns, utc_now());
-}
-
-void throw_withdrawn(const std::string& code, const std::string& when) {
-  throw UsageError("participant " + code + " has withdrawn" +
-                   (when.empty() ? "" : " (" + when + ")") +
-                   " and cannot resume. If the participant asks to take part again, add "
-                   "--after-withdrawal; 'palpate forget' removes the data on record");
-}
-
-void refuse_withdrawn(data::Store& store, const std::string& code) {
-  const std::string when = withdrawn_when(store, code);
-  if (!when.empty()) throw_withdrawn(code, when);
-}
-
-int choose_session(data::Store& store, const data::Participant& participant,
-                   const protocols::Protocol& protocol, const RunSettings& settings) {
-  const int session = session_due(store, participant, protocol, settings);
-  check_withdrawal(store, participant, session, settings);
-  return session;
-}
-
-data::ClockStamp stamp_now(servo::Clock& clock) {
-  const std::int64_t before = clock.now_ns();
-  const std::int64_t utc =
-      std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
-  return {utc, before + (clock.now_ns() - before) / 2};
-}
-
-data::RunInfo run_info(const RunSettings& settings, const servo::DeviceCapabilities& device,
-                       int session, const data::ClockStamp& began, bool joystick) {
-  data::RunInfo info;
-  info.session = session;
-  info.clock = began;
-  info.program_version = PALPATE_VERSION;
-  info.build = build_description();
-  info.device = settings.device;
-  info.device_calibration = device.calibration;
-  if (!device.serial.empty()) info.device_calibration += " (serial " + device.serial + ")";
-  info.response_device = settings.spoken    ? "spoken, typed by the experimenter"
-                         : settings.buttons ? "device buttons"
-                                            : "keyboard";
-  if (!settings.response_box.empty()) info.response_device += ", serial response box";
-  if (joystick) info.response_device += ", joystick";
-  info.response_latency = settings.response_latency;
-  info.consent_version = settings.consent;
-  if (!settings.consent.empty()) info.consent_utc_ns = began.utc_ns;
-  info.hand = settings.hand;
-  info.after_withdrawal = settings.after_withdrawal;
-  return info;
-}
-
-std::optional<data::ProtocolInfo> other_texts(const Admission& admission) {
-  data::ProtocolInfo shown = session::info_of(admission.protocol);
-  if (shown.sha256 == admission.enrolled.sha256) return std::nullopt;
-  return shown;
-}
-
-namespace {
 
 namespace fs = std::filesystem;
 
@@ -417,6 +305,110 @@ std::string ask_new_code() {
 }
 
 }  // namespace
+
+std::vector<std::string> near_codes(const std::string& code,
+                                    const std::vector<std::string>& known) {
+  std::vector<std::string> near;
+  for (const std::string& other : known) {
+    if (other == code) continue;
+    if (read_alike(other) == read_alike(code) || a_letter_away(other, code)) near.push_back(other);
+  }
+  return near;
+}
+
+std::string spoken_time(std::int64_t utc_ns, std::int64_t now_utc_ns) {
+  const std::tm then = local(utc_ns), today = local(now_utc_ns);
+  std::tm before = today;  // the day, whatever the hour and however long a day is
+  before.tm_mday -= 1;
+  before.tm_hour = 12;
+  before.tm_isdst = -1;
+  std::mktime(&before);
+  const std::string day = in_format(then, "%Y-%m-%d"), clock = in_format(then, " %H:%M");
+  if (day == in_format(today, "%Y-%m-%d")) return "today" + clock;
+  if (day == in_format(before, "%Y-%m-%d")) return "yesterday" + clock;
+  return day + clock;
+}
+
+std::string resumption(data::Store& store, const data::Participant& participant, int session,
+                       const session::SessionPlan& plan) {
+  const std::optional<data::StoredRun> last = newest_run(store, [&](const data::StoredRun& run) {
+    return run.participant.id == participant.id && run.info.session == session;
+  });
+  if (participant.id == 0 || !last) return "";
+  std::string text = std::to_string(plan.done()) + " of " + std::to_string(plan.size()) +
+                     " trials done, last run " + spoken_time(last->info.clock.utc_ns, utc_now()) +
+                     " (" + data::to_string(last->end) + ")";
+  if (!plan.finished()) text += ", continues with trial " + std::to_string(plan.next().trial);
+  return text;
+}
+
+std::string withdrawn_when(data::Store& store, const std::string& code) {
+  const std::optional<data::StoredRun> last = newest_run(
+      store, [&code](const data::StoredRun& run) { return run.participant.code == code; });
+  if (!last || last->end != data::RunEnd::withdrawn) return "";
+  std::int64_t when_ns = last->info.clock.utc_ns;
+  for (const data::StoredNote& note : store.notes()) {
+    const bool of_that_run =
+        note.participant.code == code && note.run_clock.utc_ns == last->info.clock.utc_ns;
+    if (of_that_run && note.text.starts_with(kEndNote)) when_ns = utc_of(note.utc);
+  }
+  return spoken_time(when_ns, utc_now());
+}
+
+void throw_withdrawn(const std::string& code, const std::string& when) {
+  throw UsageError("participant " + code + " has withdrawn" +
+                   (when.empty() ? "" : " (" + when + ")") +
+                   " and cannot resume. If the participant asks to take part again, add "
+                   "--after-withdrawal; 'palpate forget' removes the data on record");
+}
+
+void refuse_withdrawn(data::Store& store, const std::string& code) {
+  const std::string when = withdrawn_when(store, code);
+  if (!when.empty()) throw_withdrawn(code, when);
+}
+
+int choose_session(data::Store& store, const data::Participant& participant,
+                   const protocols::Protocol& protocol, const RunSettings& settings) {
+  const int session = session_due(store, participant, protocol, settings);
+  check_withdrawal(store, participant, session, settings);
+  return session;
+}
+
+data::ClockStamp stamp_now(servo::Clock& clock) {
+  const std::int64_t before = clock.now_ns();
+  const std::int64_t utc =
+      std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+  return {utc, before + (clock.now_ns() - before) / 2};
+}
+
+data::RunInfo run_info(const RunSettings& settings, const servo::DeviceCapabilities& device,
+                       int session, const data::ClockStamp& began, bool joystick) {
+  data::RunInfo info;
+  info.session = session;
+  info.clock = began;
+  info.program_version = PALPATE_VERSION;
+  info.build = build_description();
+  info.device = settings.device;
+  info.device_calibration = device.calibration;
+  if (!device.serial.empty()) info.device_calibration += " (serial " + device.serial + ")";
+  info.response_device = settings.spoken    ? "spoken, typed by the experimenter"
+                         : settings.buttons ? "device buttons"
+                                            : "keyboard";
+  if (!settings.response_box.empty()) info.response_device += ", serial response box";
+  if (joystick) info.response_device += ", joystick";
+  info.response_latency = settings.response_latency;
+  info.consent_version = settings.consent;
+  if (!settings.consent.empty()) info.consent_utc_ns = began.utc_ns;
+  info.hand = settings.hand;
+  info.after_withdrawal = settings.after_withdrawal;
+  return info;
+}
+
+std::optional<data::ProtocolInfo> other_texts(const Admission& admission) {
+  data::ProtocolInfo shown = session::info_of(admission.protocol);
+  if (shown.sha256 == admission.enrolled.sha256) return std::nullopt;
+  return shown;
+}
 
 Admission admit(const RunSettings& settings) {
   Admission admission;

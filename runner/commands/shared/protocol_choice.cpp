@@ -103,18 +103,6 @@ std::vector<data::FaultMeaning> fault_bits() {
   return all;
 }
 
-}  // namespace
-
-data::ExportSettings export_settings() {
-  data::ExportSettings settings;
-  settings.program_version = PALPATE_VERSION;
-  settings.facts = facts_of;
-  settings.fault_bits = fault_bits();
-  return settings;
-}
-
-namespace {
-
 std::string to_the_minute(std::int64_t utc_ns) {
   std::string text = data::format_utc(utc_ns).substr(0, 16);
   text[10] = ' ';
@@ -160,6 +148,14 @@ ProtocolChoice ask_which(const std::string& code, bool only_texts) {
 }
 
 }  // namespace
+
+data::ExportSettings export_settings() {
+  data::ExportSettings settings;
+  settings.program_version = PALPATE_VERSION;
+  settings.facts = facts_of;
+  settings.fault_bits = fault_bits();
+  return settings;
+}
 
 std::optional<EarlierProtocol> earlier_protocol(data::Store& store,
                                                 const protocols::Protocol& protocol,

@@ -20,41 +20,6 @@ namespace {
 // mm; a hand cannot reach around larger objects, nor feel the shape of smaller ones.
 constexpr double kBeyondHands = 1000, kBelowTouch = 0.1;
 
-}  // namespace
-
-std::vector<std::string> objects_passed_through(const protocols::SceneSpec& scene) {
-  const auto is_soft = [](const stimuli::ObjectSpec& object) { return object.soft.has_value(); };
-  const bool any_soft = std::any_of(scene.objects.begin(), scene.objects.end(), is_soft);
-  std::vector<std::string> notes;
-  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
-    const stimuli::ObjectSpec& object = scene.objects[i];
-    const std::string place = "/objects/" + std::to_string(i) + ": ";
-    if (object.body && any_soft)
-      notes.push_back(place + "moves through soft objects: they touch only the tool");
-    const bool falls = object.soft && object.soft->fixed == stimuli::Soft::Fixed::none &&
-                       glm::length(scene.gravity) > 0;
-    if (falls && scene.objects.size() > 1)
-      notes.push_back(place +
-                      "is soft, not fixed, and falls through the other objects: soft ones "
-                      "touch only the tool");
-  }
-  return notes;
-}
-
-std::optional<std::string> elements_felt(const rendering::SoftObject& object) {
-  const double spacing = object.node_spacing(), radius = object.contact.radius;
-  if (spacing <= radius) return std::nullopt;
-  char text[240];
-  std::snprintf(text, sizeof text,
-                "the nodes of its elements are %.1f mm apart and the tool has a radius of %.1f mm: "
-                "a sliding tool feels each node; expected a tool/radius_m of the "
-                "spacing or more, or a higher soft/resolution",
-                1000 * spacing, 1000 * radius);
-  return text;
-}
-
-namespace {
-
 std::string size_in_mm(const Vec3& size_m) {
   const Vec3 size = 1000.0 * size_m;
   const bool is_large = std::max({size.x, size.y, size.z}) >= 1000;
@@ -93,6 +58,37 @@ std::string solid_note(const stimuli::ObjectSpec& object) {
 }
 
 }  // namespace
+
+std::vector<std::string> objects_passed_through(const protocols::SceneSpec& scene) {
+  const auto is_soft = [](const stimuli::ObjectSpec& object) { return object.soft.has_value(); };
+  const bool any_soft = std::any_of(scene.objects.begin(), scene.objects.end(), is_soft);
+  std::vector<std::string> notes;
+  for (std::size_t i = 0; i < scene.objects.size(); ++i) {
+    const stimuli::ObjectSpec& object = scene.objects[i];
+    const std::string place = "/objects/" + std::to_string(i) + ": ";
+    if (object.body && any_soft)
+      notes.push_back(place + "moves through soft objects: they touch only the tool");
+    const bool falls = object.soft && object.soft->fixed == stimuli::Soft::Fixed::none &&
+                       glm::length(scene.gravity) > 0;
+    if (falls && scene.objects.size() > 1)
+      notes.push_back(place +
+                      "is soft, not fixed, and falls through the other objects: soft ones "
+                      "touch only the tool");
+  }
+  return notes;
+}
+
+std::optional<std::string> elements_felt(const rendering::SoftObject& object) {
+  const double spacing = object.node_spacing(), radius = object.contact.radius;
+  if (spacing <= radius) return std::nullopt;
+  char text[240];
+  std::snprintf(text, sizeof text,
+                "the nodes of its elements are %.1f mm apart and the tool has a radius of %.1f mm: "
+                "a sliding tool feels each node; expected a tool/radius_m of the "
+                "spacing or more, or a higher soft/resolution",
+                1000 * spacing, 1000 * radius);
+  return text;
+}
 
 std::vector<std::string> mesh_notes(const stimuli::ObjectSpec& object, SceneBuilder& builder) {
   std::vector<std::string> notes;

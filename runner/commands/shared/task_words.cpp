@@ -27,6 +27,8 @@ struct ListedTrial {
   bool example = false;  ///< depends on answers
 };
 
+using protocols::level_text;
+
 ListedTrial listed(const protocols::Protocol& protocol, const protocols::Trial& trial) {
   const auto& block = *protocols::block_of(protocol, trial);
   return {trial,
@@ -115,20 +117,6 @@ std::string json_text(const protocols::Protocol& protocol, int participant,
   return document.dump(1) + "\n";
 }
 
-}  // namespace
-
-std::string task_schedule_text(const protocols::Protocol& protocol, int participant,
-                               const std::string& format) {
-  const std::vector<protocols::Trial> trials = example_trials(protocol, participant);
-  if (format == "csv") return csv_text(protocol, participant, trials);
-  if (format == "json") return json_text(protocol, participant, trials);
-  return table_text(protocol, trials);
-}
-
-namespace {
-
-using protocols::level_text;
-
 std::string joined(const std::vector<double>& values) {
   std::string text;
   for (const double value : values) text += (text.empty() ? "" : ", ") + level_text(value);
@@ -184,7 +172,77 @@ bool succeeds(const protocols::Protocol& protocol, const protocols::TaskBlock& b
          protocols::psychometric_probability(typical.function, typical.parameters, *trial.level);
 }
 
+struct RecoveredProcedure {
+  const protocols::TaskBlock* block;
+  std::size_t number;  ///< from 1, within the block
+  protocols::PsychometricParticipant participant;
+  double truth;  ///< a level
+  protocols::Recovery recovery;
+};
+
+/// QUEST+ is tried with a participant that fits its model: of its function, in the middle of its
+/// grids.
+protocols::PsychometricParticipant participant_for(const protocols::Protocol& protocol,
+                                                   const protocols::TaskBlock& block,
+                                                   const protocols::ProcedureSpec& procedure) {
+  protocols::PsychometricParticipant participant = protocols::typical_participant(protocol, block);
+  if (const auto* quest = std::get_if<protocols::QuestPlus>(&procedure)) {
+    const auto middle = [](const protocols::ParameterGrid& grid) {
+      return grid.values[grid.values.size() / 2];
+    };
+    participant.function = quest->function;
+    participant.parameters = {middle(quest->threshold), middle(quest->slope),
+                              quest->guess.values.front(), quest->lapse.values.front()};
+  }
+  return participant;
+}
+
+std::vector<RecoveredProcedure> recovered(const protocols::Protocol& protocol, int participants,
+                                          std::uint64_t seed) {
+  std::vector<RecoveredProcedure> all;
+  for (const protocols::TaskBlock& block : protocol.blocks) {
+    for (std::size_t i = 0; i < block.procedures.size(); ++i) {
+      const protocols::ProcedureSpec& procedure = block.procedures[i];
+      if (block.practice || std::holds_alternative<protocols::ConstantStimuli>(procedure)) continue;
+      const auto participant = participant_for(protocol, block, procedure);
+      all.push_back({&block, i + 1, participant, protocols::true_threshold(procedure, participant),
+                     protocols::simulate_recovery(procedure, participant, participants, seed)});
+    }
+  }
+  if (all.empty())
+    throw UsageError(
+        "--recover: expected a protocol of version 2 with a staircase, QUEST+ or limits");
+  return all;
+}
+
+std::string table_text(const std::vector<RecoveredProcedure>& all, int participants,
+                       std::uint64_t seed) {
+  std::string text = std::to_string(participants) +
+                     " SIMULATED participants whose function is known, seed " +
+                     std::to_string(seed) + "; bias and spread on the scale of the procedure\n";
+  for (const RecoveredProcedure& one : all) {
+    std::array<char, 300> line{};
+    std::snprintf(line.data(), line.size(),
+                  "%s, %s\n  true threshold %.6g: bias %.4g (standard error %.2g), spread %.4g, "
+                  "%.1f trials, %d without an estimate\n",
+                  one.block->name.c_str(),
+                  in_words(one.block->procedures[one.number - 1]).substr(0, 150).c_str(), one.truth,
+                  one.recovery.bias, one.recovery.bias_se, one.recovery.spread,
+                  one.recovery.mean_trials, one.recovery.without_estimate);
+    text += line.data();
+  }
+  return text;
+}
+
 }  // namespace
+
+std::string task_schedule_text(const protocols::Protocol& protocol, int participant,
+                               const std::string& format) {
+  const std::vector<protocols::Trial> trials = example_trials(protocol, participant);
+  if (format == "csv") return csv_text(protocol, participant, trials);
+  if (format == "json") return json_text(protocol, participant, trials);
+  return table_text(protocol, trials);
+}
 
 std::string in_words(const protocols::ProcedureSpec& procedure) {
   return std::visit([](const auto& spec) { return words(spec); }, procedure);
@@ -257,72 +315,6 @@ int comparison_interval(const protocols::TaskBlock& block, const protocols::Tria
   }
   return 0;
 }
-
-namespace {
-
-struct RecoveredProcedure {
-  const protocols::TaskBlock* block;
-  std::size_t number;  ///< from 1, within the block
-  protocols::PsychometricParticipant participant;
-  double truth;  ///< a level
-  protocols::Recovery recovery;
-};
-
-/// QUEST+ is tried with a participant that fits its model: of its function, in the middle of its
-/// grids.
-protocols::PsychometricParticipant participant_for(const protocols::Protocol& protocol,
-                                                   const protocols::TaskBlock& block,
-                                                   const protocols::ProcedureSpec& procedure) {
-  protocols::PsychometricParticipant participant = protocols::typical_participant(protocol, block);
-  if (const auto* quest = std::get_if<protocols::QuestPlus>(&procedure)) {
-    const auto middle = [](const protocols::ParameterGrid& grid) {
-      return grid.values[grid.values.size() / 2];
-    };
-    participant.function = quest->function;
-    participant.parameters = {middle(quest->threshold), middle(quest->slope),
-                              quest->guess.values.front(), quest->lapse.values.front()};
-  }
-  return participant;
-}
-
-std::vector<RecoveredProcedure> recovered(const protocols::Protocol& protocol, int participants,
-                                          std::uint64_t seed) {
-  std::vector<RecoveredProcedure> all;
-  for (const protocols::TaskBlock& block : protocol.blocks) {
-    for (std::size_t i = 0; i < block.procedures.size(); ++i) {
-      const protocols::ProcedureSpec& procedure = block.procedures[i];
-      if (block.practice || std::holds_alternative<protocols::ConstantStimuli>(procedure)) continue;
-      const auto participant = participant_for(protocol, block, procedure);
-      all.push_back({&block, i + 1, participant, protocols::true_threshold(procedure, participant),
-                     protocols::simulate_recovery(procedure, participant, participants, seed)});
-    }
-  }
-  if (all.empty())
-    throw UsageError(
-        "--recover: expected a protocol of version 2 with a staircase, QUEST+ or limits");
-  return all;
-}
-
-std::string table_text(const std::vector<RecoveredProcedure>& all, int participants,
-                       std::uint64_t seed) {
-  std::string text = std::to_string(participants) +
-                     " SIMULATED participants whose function is known, seed " +
-                     std::to_string(seed) + "; bias and spread on the scale of the procedure\n";
-  for (const RecoveredProcedure& one : all) {
-    std::array<char, 300> line{};
-    std::snprintf(line.data(), line.size(),
-                  "%s, %s\n  true threshold %.6g: bias %.4g (standard error %.2g), spread %.4g, "
-                  "%.1f trials, %d without an estimate\n",
-                  one.block->name.c_str(),
-                  in_words(one.block->procedures[one.number - 1]).substr(0, 150).c_str(), one.truth,
-                  one.recovery.bias, one.recovery.bias_se, one.recovery.spread,
-                  one.recovery.mean_trials, one.recovery.without_estimate);
-    text += line.data();
-  }
-  return text;
-}
-
-}  // namespace
 
 std::string recovery_text(const protocols::Protocol& protocol, int participants, std::uint64_t seed,
                           const std::string& format) {

@@ -97,59 +97,6 @@ sweep::Design design_of(const SweepSettings& settings, const sweep::SweptStudy& 
   }
 }
 
-}  // namespace
-
-void add_sweep_options(CommandLine& line, SweepSettings& settings) {
-  line.options.add_options()  //
-      ("space", po::value(&settings.space)->required()->value_name("FILE"),
-       "what varies, and how (JSON)")  //
-      ("points", po::value(&settings.points)->required()->value_name("N"),
-       "number of studies; grid and saltelli round down to a possible number")  //
-      ("design",
-       po::value(&settings.design)->default_value("lhs")->value_name("lhs|sobol|grid|saltelli"),
-       "how the points lie: Latin hypercube, Sobol's sequence, all combinations, or Saltelli's "
-       "samples for Sobol indices")  //
-      ("seed", po::value(&settings.seed)->default_value(settings.seed)->value_name("S"),
-       "of the design and, with its number, of every point")  //
-      ("participants",
-       po::value(&settings.participants)->default_value(settings.participants)->value_name("N"),
-       "simulated participants at each point")  //
-      ("repetitions", po::value(&settings.repetitions)->value_name("R"),
-       "of each shape with each renderer, instead of the protocol's");
-  add_participant_version(line, settings.version);
-  line.options.add_options()  //
-      ("settings", po::value(&settings.patch)->value_name("FILE"),
-       "JSON merge patch on those settings, before anything varies");
-}
-
-void check_sweep_options(const po::variables_map& values, SweepSettings& settings) {
-  constexpr std::int64_t kMostPoints = 100'000'000;
-  if (settings.points < 1 || settings.points > kMostPoints)
-    throw UsageError("--points: must be 1 to " + std::to_string(kMostPoints));
-  check_simulated_participants(settings.participants);
-  if (values.count("repetitions") && (settings.repetitions < 1 || settings.repetitions > 1000000))
-    throw UsageError("--repetitions: must be 1 to 1000000");
-  check_participant_version(values, settings.version);
-  settings.protocol = values["PROTOCOL.json"].as<std::string>();
-}
-
-PlannedSweep::PlannedSweep(const SweepSettings& settings)
-    : protocol(protocols::parse_protocol(settings.protocol)),
-      study(base_protocol(protocol, settings), settings.protocol,
-            read_json(participants::simulated_settings_text(settings.patch, settings.version)),
-            protocols::parse_sweep_space(settings.space), settings.space),
-      design(design_of(settings, study)),
-      plan(plan_of_sweep(settings, study, design, protocol)) {
-  if (design.size() < settings.points) {
-    std::cerr << settings.design << ": " << design.size() << " points of the " << settings.points
-              << " requested\n";
-  }
-}
-
-namespace {
-
-using nlohmann::json;
-
 constexpr double kTooFast = 0.2;         // s; default of `analyze` for excluding trials
 constexpr std::size_t kMaxReason = 300;  // bytes, in the row of a point
 
@@ -348,6 +295,53 @@ std::string reason_of(const std::exception& error) {
 }
 
 }  // namespace
+
+void add_sweep_options(CommandLine& line, SweepSettings& settings) {
+  line.options.add_options()  //
+      ("space", po::value(&settings.space)->required()->value_name("FILE"),
+       "what varies, and how (JSON)")  //
+      ("points", po::value(&settings.points)->required()->value_name("N"),
+       "number of studies; grid and saltelli round down to a possible number")  //
+      ("design",
+       po::value(&settings.design)->default_value("lhs")->value_name("lhs|sobol|grid|saltelli"),
+       "how the points lie: Latin hypercube, Sobol's sequence, all combinations, or Saltelli's "
+       "samples for Sobol indices")  //
+      ("seed", po::value(&settings.seed)->default_value(settings.seed)->value_name("S"),
+       "of the design and, with its number, of every point")  //
+      ("participants",
+       po::value(&settings.participants)->default_value(settings.participants)->value_name("N"),
+       "simulated participants at each point")  //
+      ("repetitions", po::value(&settings.repetitions)->value_name("R"),
+       "of each shape with each renderer, instead of the protocol's");
+  add_participant_version(line, settings.version);
+  line.options.add_options()  //
+      ("settings", po::value(&settings.patch)->value_name("FILE"),
+       "JSON merge patch on those settings, before anything varies");
+}
+
+void check_sweep_options(const po::variables_map& values, SweepSettings& settings) {
+  constexpr std::int64_t kMostPoints = 100'000'000;
+  if (settings.points < 1 || settings.points > kMostPoints)
+    throw UsageError("--points: must be 1 to " + std::to_string(kMostPoints));
+  check_simulated_participants(settings.participants);
+  if (values.count("repetitions") && (settings.repetitions < 1 || settings.repetitions > 1000000))
+    throw UsageError("--repetitions: must be 1 to 1000000");
+  check_participant_version(values, settings.version);
+  settings.protocol = values["PROTOCOL.json"].as<std::string>();
+}
+
+PlannedSweep::PlannedSweep(const SweepSettings& settings)
+    : protocol(protocols::parse_protocol(settings.protocol)),
+      study(base_protocol(protocol, settings), settings.protocol,
+            read_json(participants::simulated_settings_text(settings.patch, settings.version)),
+            protocols::parse_sweep_space(settings.space), settings.space),
+      design(design_of(settings, study)),
+      plan(plan_of_sweep(settings, study, design, protocol)) {
+  if (design.size() < settings.points) {
+    std::cerr << settings.design << ": " << design.size() << " points of the " << settings.points
+              << " requested\n";
+  }
+}
 
 sweep::PointStudy study_of_point(const Sweep& sweep, std::int64_t point) {
   return sweep.study.at(sweep.plan.seed, point, values_of_point(sweep, point));

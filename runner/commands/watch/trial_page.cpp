@@ -29,6 +29,7 @@
 #include "runner/session/replay.h"
 
 namespace palpate::runner::commands {
+namespace {
 
 // Columns of numbers in the text of a page: integer multiples of a step, as differences of the
 // order that takes the fewest bytes, 7 bits a byte (zigzag, least significant first), in one zlib
@@ -49,8 +50,6 @@ class WholeNumbers {
   nlohmann::ordered_json columns_ = nlohmann::ordered_json::array();
   std::string bytes_;
 };
-
-namespace {
 
 constexpr int kHighestOrder = 3;
 // JavaScript has double precision, exact to 2^53; a difference of order 3 is up to 8 times a value,
@@ -86,8 +85,6 @@ std::string deflated(const std::string& bytes) {
   return out;
 }
 
-}  // namespace
-
 void WholeNumbers::add(const std::string& name, std::span<const double> values,
                        double steps_per_unit) {
   std::vector<std::int64_t> whole;
@@ -112,8 +109,6 @@ void WholeNumbers::add(const std::string& name, std::span<const double> values,
 }
 
 std::string WholeNumbers::text() const { return base64_encoded(deflated(bytes_)); }
-
-namespace {
 
 using Cell = std::array<std::int64_t, 3>;
 
@@ -157,24 +152,6 @@ double size_of(const display::DrawnMesh& drawn) {
   }
   return std::max({high.x - low.x, high.y - low.y, high.z - low.z});
 }
-
-}  // namespace
-
-PictureMesh picture_mesh(const stimuli::ObjectSpec& object, std::size_t most) {
-  constexpr double kSame = 1e-6, kCoarser = 1.25;  // of the size
-  const display::DrawnMesh drawn = display::triangles_of(object);
-  const double size = size_of(drawn);
-  PictureMesh mesh = clustered(drawn, kSame * size);
-  const std::size_t all = mesh.triangles.size();
-  // The corners of n triangles are some size / sqrt(n) apart.
-  for (double cell = 0.5 * size / std::sqrt(static_cast<double>(most));
-       mesh.triangles.size() > most; cell *= kCoarser)
-    mesh = clustered(drawn, cell);
-  mesh.all_triangles = all;
-  return mesh;
-}
-
-namespace {
 
 using analysis::counted;
 using analysis::escaped;
@@ -521,6 +498,20 @@ class PageBuilder {
 };
 
 }  // namespace
+
+PictureMesh picture_mesh(const stimuli::ObjectSpec& object, std::size_t most) {
+  constexpr double kSame = 1e-6, kCoarser = 1.25;  // of the size
+  const display::DrawnMesh drawn = display::triangles_of(object);
+  const double size = size_of(drawn);
+  PictureMesh mesh = clustered(drawn, kSame * size);
+  const std::size_t all = mesh.triangles.size();
+  // The corners of n triangles are some size / sqrt(n) apart.
+  for (double cell = 0.5 * size / std::sqrt(static_cast<double>(most));
+       mesh.triangles.size() > most; cell *= kCoarser)
+    mesh = clustered(drawn, cell);
+  mesh.all_triangles = all;
+  return mesh;
+}
 
 TrialPage trial_page(const std::vector<WatchedTrial>& trials, bool compare) {
   return PageBuilder(trials, compare).build();

@@ -35,59 +35,6 @@ std::string hex(std::uint32_t word) {
   return text.str();
 }
 
-}  // namespace
-
-FirmwareImage parse_image(std::vector<std::uint8_t> bytes, const std::string& file) {
-  const auto word = [&bytes](std::size_t at) {
-    return std::uint32_t{bytes[at]} | std::uint32_t{bytes[at + 1]} << 8;
-  };
-  if (bytes.size() < kHeader + 2) {
-    refuse(file, bytes.size(), "expected at least " + std::to_string(kHeader + 2) + " bytes");
-  }
-  if (word(0) != kKey) refuse(file, 0, "expected the key 0x8AA, found " + hex(word(0)));
-  FirmwareImage image;
-  image.entry = word(18) << 16 | word(20);
-  std::size_t at = kHeader;
-  for (;;) {
-    if (at + 2 > bytes.size()) refuse(file, at, "expected a block or the end mark, found nothing");
-    const std::size_t words = word(at);
-    at += 2;
-    if (words == 0) break;
-    const std::size_t end = at + 4 + 2 * words;
-    if (end > bytes.size()) {
-      refuse(file, at - 2,
-             "a block of " + std::to_string(words) + " words runs past the end (" +
-                 std::to_string(bytes.size()) + " bytes)");
-    }
-    at = end;
-    ++image.blocks;
-  }
-  if (image.blocks == 0) refuse(file, kHeader, "expected at least one block");
-  if (at != bytes.size()) refuse(file, at, "expected the end of the file after the end mark");
-  image.bytes = std::move(bytes);
-  return image;
-}
-
-FirmwareImage read_image(const std::string& file) {
-  std::error_code error;
-  if (!std::filesystem::is_regular_file(file, error)) {
-    throw protocols::InputError(
-        {{file, "",
-          "expected a firmware file. None is shipped: name the one of the Falcon's "
-          "own driver or of a libnifalcon checkout"}});
-  }
-  if (std::filesystem::file_size(file, error) > kMaxBytes || error) {
-    throw protocols::InputError({{file, "", "expected at most 256 KiB of firmware"}});
-  }
-  std::ifstream in(file, std::ios::binary);
-  std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(in),
-                                  std::istreambuf_iterator<char>()};
-  if (!in) throw protocols::InputError({{file, "", "cannot be read; check its permissions"}});
-  return parse_image(std::move(bytes), file);
-}
-
-namespace {
-
 using Bytes = std::span<const std::uint8_t>;
 
 constexpr std::array<std::uint8_t, 3> kMonitorProbe = {0x0A, 0x43, 0x0D};
@@ -100,6 +47,20 @@ constexpr std::size_t kChunk = 62;
 class AttemptFailed : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
+
+/// Receives `count` bytes, or fewer on time-out.
+std::vector<std::uint8_t> receive(Transport& transport, std::size_t count, std::int64_t wait_ns) {
+  std::vector<std::uint8_t> bytes(count);
+  std::size_t have = 0;
+  const std::int64_t end = transport.now_ns() + wait_ns;
+  while (have < count) {
+    const std::int64_t left = end - transport.now_ns();
+    if (left <= 0 || transport.gone()) break;
+    have += transport.receive(std::span(bytes).subspan(have), left);
+  }
+  bytes.resize(have);
+  return bytes;
+}
 
 void purge(Transport& transport) {
   transport.control(request::kPurge, 1);
@@ -115,20 +76,6 @@ void send(Transport& transport, Bytes bytes) {
     throw TransportError("the Falcon " + transport.serial() + " was unplugged while starting");
   }
   throw AttemptFailed("bytes could not be sent");
-}
-
-/// Receives `count` bytes, or fewer on time-out.
-std::vector<std::uint8_t> receive(Transport& transport, std::size_t count, std::int64_t wait_ns) {
-  std::vector<std::uint8_t> bytes(count);
-  std::size_t have = 0;
-  const std::int64_t end = transport.now_ns() + wait_ns;
-  while (have < count) {
-    const std::int64_t left = end - transport.now_ns();
-    if (left <= 0 || transport.gone()) break;
-    have += transport.receive(std::span(bytes).subspan(have), left);
-  }
-  bytes.resize(have);
-  return bytes;
 }
 
 /// Searches for the monitor's answer in all received bytes: others may precede it.
@@ -199,6 +146,55 @@ void upload(Transport& transport, const FirmwareImage& image, const BootSettings
 }
 
 }  // namespace
+
+FirmwareImage parse_image(std::vector<std::uint8_t> bytes, const std::string& file) {
+  const auto word = [&bytes](std::size_t at) {
+    return std::uint32_t{bytes[at]} | std::uint32_t{bytes[at + 1]} << 8;
+  };
+  if (bytes.size() < kHeader + 2) {
+    refuse(file, bytes.size(), "expected at least " + std::to_string(kHeader + 2) + " bytes");
+  }
+  if (word(0) != kKey) refuse(file, 0, "expected the key 0x8AA, found " + hex(word(0)));
+  FirmwareImage image;
+  image.entry = word(18) << 16 | word(20);
+  std::size_t at = kHeader;
+  for (;;) {
+    if (at + 2 > bytes.size()) refuse(file, at, "expected a block or the end mark, found nothing");
+    const std::size_t words = word(at);
+    at += 2;
+    if (words == 0) break;
+    const std::size_t end = at + 4 + 2 * words;
+    if (end > bytes.size()) {
+      refuse(file, at - 2,
+             "a block of " + std::to_string(words) + " words runs past the end (" +
+                 std::to_string(bytes.size()) + " bytes)");
+    }
+    at = end;
+    ++image.blocks;
+  }
+  if (image.blocks == 0) refuse(file, kHeader, "expected at least one block");
+  if (at != bytes.size()) refuse(file, at, "expected the end of the file after the end mark");
+  image.bytes = std::move(bytes);
+  return image;
+}
+
+FirmwareImage read_image(const std::string& file) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(file, error)) {
+    throw protocols::InputError(
+        {{file, "",
+          "expected a firmware file. None is shipped: name the one of the Falcon's "
+          "own driver or of a libnifalcon checkout"}});
+  }
+  if (std::filesystem::file_size(file, error) > kMaxBytes || error) {
+    throw protocols::InputError({{file, "", "expected at most 256 KiB of firmware"}});
+  }
+  std::ifstream in(file, std::ios::binary);
+  std::vector<std::uint8_t> bytes{std::istreambuf_iterator<char>(in),
+                                  std::istreambuf_iterator<char>()};
+  if (!in) throw protocols::InputError({{file, "", "cannot be read; check its permissions"}});
+  return parse_image(std::move(bytes), file);
+}
 
 bool firmware_runs(Transport& transport, const BootSettings& settings) {
   transport.control(request::kLatency, 1);

@@ -20,28 +20,6 @@
 #include "runner/devices/falcon/parameters.h"
 
 namespace palpate::runner::devices::falcon {
-
-void wait_until_homed(servo::Device& device, servo::Clock& clock, Guide& guide) {
-  constexpr std::int64_t kTickNs = 1'000'000;
-  servo::DeviceTrouble announced = servo::DeviceTrouble::none;
-  for (;;) {
-    clock.wait_until(clock.now_ns() + kTickNs);
-    const servo::DeviceReading reading = device.read();
-    device.write(Vec3(0), Vec3(0));
-    if (!reading.lost && reading.trouble == servo::DeviceTrouble::none) return;
-    if (reading.trouble == servo::DeviceTrouble::unplugged ||
-        reading.trouble == servo::DeviceTrouble::guard_lost) {
-      throw GuideError(servo::advice(reading.trouble));
-    }
-    if (reading.lost && reading.trouble != announced &&
-        reading.trouble != servo::DeviceTrouble::guarded) {
-      announced = reading.trouble;
-      guide.say(device.capabilities().serial + ": " + servo::advice(announced));
-    }
-    if (guide.answer() == Guide::Answer::stop) throw GuideError("stopped; nothing was stored");
-  }
-}
-
 namespace {
 
 constexpr int kVersion = 1;
@@ -185,118 +163,6 @@ void require_own(const std::string& path) {
              : "expected a file of this user or of root, since it decides what force reaches a "
                "hand: copy it once it has been checked"}});
 }
-
-}  // namespace
-
-bool plausible(const ForceCalibration& force) {
-  const double times = force.counts_per_torque / kCountsPerTorque;
-  return times >= 1 / kPlausibleFactor && times <= kPlausibleFactor;
-}
-
-const ForceCalibration* Calibration::force_of(const std::string& serial) const {
-  const auto found = std::find_if(forces.begin(), forces.end(),
-                                  [&](const auto& force) { return force.serial == serial; });
-  return found == forces.end() ? nullptr : &*found;
-}
-
-const PairRegistration* Calibration::pair_of(const std::string& tip,
-                                             const std::string& tail) const {
-  const auto found = std::find_if(pairs.begin(), pairs.end(), [&](const auto& pair) {
-    return pair.tip_serial == tip && pair.tail_serial == tail;
-  });
-  return found == pairs.end() ? nullptr : &*found;
-}
-
-void Calibration::put(const ForceCalibration& force) {
-  std::erase_if(forces, [&](const ForceCalibration& old) { return old.serial == force.serial; });
-  forces.push_back(force);
-}
-
-void Calibration::put(const PairRegistration& pair) {
-  std::erase_if(pairs, [&](const auto& old) {
-    return old.tip_serial == pair.tip_serial && old.tail_serial == pair.tail_serial;
-  });
-  pairs.push_back(pair);
-}
-
-Calibration parse_calibration(const std::string& text, const std::string& path) {
-  protocols::FaultList faults(path);
-  const nlohmann::json json = protocols::read_json(text, faults);
-  Calibration calibration;
-  protocols::ObjectReader root(json, "", faults);
-  int version = kVersion;
-  root.integer("version", version, {kVersion, kVersion}, protocols::Presence::required);
-  read_list(root, "forces", calibration.forces, read_force);
-  read_list(root, "pairs", calibration.pairs, read_pair);
-  root.refuse_unknown_keys();
-  faults.throw_if_any();
-  return calibration;
-}
-
-Calibration read_calibration(const std::string& path) {
-  if (!std::filesystem::exists(path)) return {};
-  require_own(path);
-  return parse_calibration(protocols::read_text_file(path), path);
-}
-
-std::string to_json(const Calibration& calibration) {
-  using nlohmann::ordered_json;
-  const auto seal = [](ordered_json& object, bool sealed) {
-    if (sealed) object["sha256"] = json_checksum(nlohmann::json(object));
-  };
-  ordered_json forces = ordered_json::array(), pairs = ordered_json::array();
-  for (const ForceCalibration& force : calibration.forces) {
-    forces.push_back({{"serial", force.serial},
-                      {"counts_per_newton_metre", force.counts_per_torque},
-                      {"residual_n", force.residual},
-                      {"sideways_n_per_n", force.sideways},
-                      {"arm_weight_n", force.arm_weight},
-                      {"weights_kg", force.weights},
-                      {"made_utc", force.made_utc}});
-    seal(forces.back(), force.sealed);
-  }
-  for (const PairRegistration& pair : calibration.pairs) {
-    const Vec3& p = pair.tail_in_tip.position;
-    const Quat& q = pair.tail_in_tip.orientation;
-    pairs.push_back({{"tip_serial", pair.tip_serial},
-                     {"tail_serial", pair.tail_serial},
-                     {"tail_position_m", {p.x, p.y, p.z}},
-                     {"tail_orientation_wxyz", {q.w, q.x, q.y, q.z}},
-                     {"stylus_length_m", pair.stylus_length},
-                     {"residual_m", pair.residual},
-                     {"points", pair.points},
-                     {"made_utc", pair.made_utc}});
-    seal(pairs.back(), pair.sealed);
-  }
-  const ordered_json all = {{"version", kVersion}, {"forces", forces}, {"pairs", pairs}};
-  return all.dump(2) + "\n";
-}
-
-CalibrationVerdict both(const CalibrationVerdict& a, const CalibrationVerdict& b) {
-  return {std::max(a.state, b.state),
-          a.text + (a.text.empty() || b.text.empty() ? "" : "\n") + b.text};
-}
-
-CalibrationVerdict judge_forces(const Calibration& calibration,
-                                const std::vector<std::string>& serials, std::int64_t unix_ns) {
-  CalibrationVerdict verdict;
-  for (const std::string& serial : serials) {
-    const ForceCalibration* force = calibration.force_of(serial);
-    const std::string what = "force of the Falcon " + serial;
-    verdict = both(verdict, force != nullptr && !plausible(*force) ? implausible(what, *force)
-                                                                   : judge(what, force, unix_ns));
-  }
-  return verdict;
-}
-
-CalibrationVerdict judge_pair(const Calibration& calibration, const std::string& tip,
-                              const std::string& tail, std::int64_t unix_ns) {
-  const PairRegistration* pair = calibration.pair_of(tip, tail);
-  return judge("registration of the devices " + tip + " (tip) and " + tail + " (tail)", pair,
-               unix_ns);
-}
-
-namespace {
 
 constexpr double kTick = 1e-3;  // s
 constexpr std::int64_t kWeighingTickNs = 1'000'000;
@@ -464,6 +330,135 @@ class WeighingProcedure {
 };
 
 }  // namespace
+
+void wait_until_homed(servo::Device& device, servo::Clock& clock, Guide& guide) {
+  constexpr std::int64_t kTickNs = 1'000'000;
+  servo::DeviceTrouble announced = servo::DeviceTrouble::none;
+  for (;;) {
+    clock.wait_until(clock.now_ns() + kTickNs);
+    const servo::DeviceReading reading = device.read();
+    device.write(Vec3(0), Vec3(0));
+    if (!reading.lost && reading.trouble == servo::DeviceTrouble::none) return;
+    if (reading.trouble == servo::DeviceTrouble::unplugged ||
+        reading.trouble == servo::DeviceTrouble::guard_lost) {
+      throw GuideError(servo::advice(reading.trouble));
+    }
+    if (reading.lost && reading.trouble != announced &&
+        reading.trouble != servo::DeviceTrouble::guarded) {
+      announced = reading.trouble;
+      guide.say(device.capabilities().serial + ": " + servo::advice(announced));
+    }
+    if (guide.answer() == Guide::Answer::stop) throw GuideError("stopped; nothing was stored");
+  }
+}
+
+bool plausible(const ForceCalibration& force) {
+  const double times = force.counts_per_torque / kCountsPerTorque;
+  return times >= 1 / kPlausibleFactor && times <= kPlausibleFactor;
+}
+
+const ForceCalibration* Calibration::force_of(const std::string& serial) const {
+  const auto found = std::find_if(forces.begin(), forces.end(),
+                                  [&](const auto& force) { return force.serial == serial; });
+  return found == forces.end() ? nullptr : &*found;
+}
+
+const PairRegistration* Calibration::pair_of(const std::string& tip,
+                                             const std::string& tail) const {
+  const auto found = std::find_if(pairs.begin(), pairs.end(), [&](const auto& pair) {
+    return pair.tip_serial == tip && pair.tail_serial == tail;
+  });
+  return found == pairs.end() ? nullptr : &*found;
+}
+
+void Calibration::put(const ForceCalibration& force) {
+  std::erase_if(forces, [&](const ForceCalibration& old) { return old.serial == force.serial; });
+  forces.push_back(force);
+}
+
+void Calibration::put(const PairRegistration& pair) {
+  std::erase_if(pairs, [&](const auto& old) {
+    return old.tip_serial == pair.tip_serial && old.tail_serial == pair.tail_serial;
+  });
+  pairs.push_back(pair);
+}
+
+Calibration parse_calibration(const std::string& text, const std::string& path) {
+  protocols::FaultList faults(path);
+  const nlohmann::json json = protocols::read_json(text, faults);
+  Calibration calibration;
+  protocols::ObjectReader root(json, "", faults);
+  int version = kVersion;
+  root.integer("version", version, {kVersion, kVersion}, protocols::Presence::required);
+  read_list(root, "forces", calibration.forces, read_force);
+  read_list(root, "pairs", calibration.pairs, read_pair);
+  root.refuse_unknown_keys();
+  faults.throw_if_any();
+  return calibration;
+}
+
+Calibration read_calibration(const std::string& path) {
+  if (!std::filesystem::exists(path)) return {};
+  require_own(path);
+  return parse_calibration(protocols::read_text_file(path), path);
+}
+
+std::string to_json(const Calibration& calibration) {
+  using nlohmann::ordered_json;
+  const auto seal = [](ordered_json& object, bool sealed) {
+    if (sealed) object["sha256"] = json_checksum(nlohmann::json(object));
+  };
+  ordered_json forces = ordered_json::array(), pairs = ordered_json::array();
+  for (const ForceCalibration& force : calibration.forces) {
+    forces.push_back({{"serial", force.serial},
+                      {"counts_per_newton_metre", force.counts_per_torque},
+                      {"residual_n", force.residual},
+                      {"sideways_n_per_n", force.sideways},
+                      {"arm_weight_n", force.arm_weight},
+                      {"weights_kg", force.weights},
+                      {"made_utc", force.made_utc}});
+    seal(forces.back(), force.sealed);
+  }
+  for (const PairRegistration& pair : calibration.pairs) {
+    const Vec3& p = pair.tail_in_tip.position;
+    const Quat& q = pair.tail_in_tip.orientation;
+    pairs.push_back({{"tip_serial", pair.tip_serial},
+                     {"tail_serial", pair.tail_serial},
+                     {"tail_position_m", {p.x, p.y, p.z}},
+                     {"tail_orientation_wxyz", {q.w, q.x, q.y, q.z}},
+                     {"stylus_length_m", pair.stylus_length},
+                     {"residual_m", pair.residual},
+                     {"points", pair.points},
+                     {"made_utc", pair.made_utc}});
+    seal(pairs.back(), pair.sealed);
+  }
+  const ordered_json all = {{"version", kVersion}, {"forces", forces}, {"pairs", pairs}};
+  return all.dump(2) + "\n";
+}
+
+CalibrationVerdict both(const CalibrationVerdict& a, const CalibrationVerdict& b) {
+  return {std::max(a.state, b.state),
+          a.text + (a.text.empty() || b.text.empty() ? "" : "\n") + b.text};
+}
+
+CalibrationVerdict judge_forces(const Calibration& calibration,
+                                const std::vector<std::string>& serials, std::int64_t unix_ns) {
+  CalibrationVerdict verdict;
+  for (const std::string& serial : serials) {
+    const ForceCalibration* force = calibration.force_of(serial);
+    const std::string what = "force of the Falcon " + serial;
+    verdict = both(verdict, force != nullptr && !plausible(*force) ? implausible(what, *force)
+                                                                   : judge(what, force, unix_ns));
+  }
+  return verdict;
+}
+
+CalibrationVerdict judge_pair(const Calibration& calibration, const std::string& tip,
+                              const std::string& tail, std::int64_t unix_ns) {
+  const PairRegistration* pair = calibration.pair_of(tip, tail);
+  return judge("registration of the devices " + tip + " (tip) and " + tail + " (tail)", pair,
+               unix_ns);
+}
 
 ForceCalibration fit_scale(const std::vector<Weighing>& weighings) {
   const auto n = static_cast<double>(weighings.size());

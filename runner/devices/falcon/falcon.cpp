@@ -50,6 +50,82 @@ bool within_reach(const Vec3& p) {
   return p.z >= kNearest && p.z <= kFarthest && std::hypot(p.x, p.y) <= kWidest;
 }
 
+constexpr int kMaxImplausible = 5;  // in a row; more: the encoders have lost their reference
+constexpr double kSlack = 0.002;    // m, beyond the fastest hand's motion
+constexpr std::int64_t kHaltReply = 20'000'000;  // ns
+constexpr int kHaltTries = 3;
+
+std::int64_t unix_ns() {
+  return std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
+}
+
+Calibration calibration_in(const std::string& path) {
+  return path.empty() ? Calibration{} : read_calibration(path);
+}
+
+std::optional<FirmwareImage> image_in(const std::string& path) {
+  if (path.empty()) return std::nullopt;
+  return read_image(path);
+}
+
+/// \throws InputError if the calibration has no registration of these two.
+const PairRegistration& registration_in(const Calibration& calibration,
+                                        const servo::DeviceConfig& config) {
+  const std::string &tip = config.serials[0], &tail = config.serials[1];
+  if (const PairRegistration* pair = calibration.pair_of(tip, tail)) return *pair;
+  throw protocols::InputError(
+      {{config.calibration.empty() ? "(no calibration file)" : config.calibration, "/pairs",
+        "expected a registration of the Falcons " + tip + " (tip) and " + tail +
+            " (tail), which gives their relative pose: run "
+            "palpate devices --calibrate --device falcon2"}});
+}
+
+CalibrationVerdict judge(const Calibration& calibration, const std::vector<std::string>& serials) {
+  CalibrationVerdict verdict = judge_forces(calibration, serials, unix_ns());
+  if (serials.size() == 2) {
+    verdict = both(verdict, judge_pair(calibration, serials[0], serials[1], unix_ns()));
+  }
+  return verdict;
+}
+
+/// The text for DeviceCapabilities; empty: missing.
+std::string summary_of(const CalibrationVerdict& verdict) {
+  switch (verdict.state) {
+    case CalibrationState::good:
+      return verdict.text;
+    case CalibrationState::stale:
+      return "stale: " + verdict.text;
+    case CalibrationState::implausible:
+      return "implausible: " + verdict.text;
+    case CalibrationState::missing:
+      return "";
+  }
+  return "";
+}
+
+servo::DeviceCapabilities nominal(const char* name, int freedom) {
+  servo::DeviceCapabilities can;
+  can.name = name;
+  can.sensed_freedom = can.actuated_freedom = freedom;
+  can.max_stiffness = kMaxStiffness;
+  can.max_rate = kMaxRate;
+  can.workspace_radius = kWorkspaceRadius;
+  can.resolution = kResolution;
+  return can;
+}
+
+void show_progress(const std::string& serial, const BootProgress& progress) {
+  if (isatty(STDERR_FILENO) == 0) return;
+  using Step = BootProgress::Step;
+  if (progress.step == Step::monitor && progress.attempt > 1) {
+    std::cerr << "\n  " << printable(progress.trouble) << "; attempt " << progress.attempt << "\n";
+  }
+  if (progress.step != Step::uploading) return;
+  std::cerr << "\rFalcon " << printable(serial) << ": firmware "
+            << 100 * progress.sent / progress.size << " %"
+            << (progress.sent == progress.size ? "\n" : "") << std::flush;
+}
+
 }  // namespace
 
 Vec3 thigh_angles(const Vec3& counts) { return kZeroAngle + kCountAngle * counts; }
@@ -144,15 +220,6 @@ double force_in_every_direction(const Vec3& position, double max_torque) noexcep
   return max_torque / std::max({glm::length(j.columns[0]), glm::length(j.columns[1]),
                                 glm::length(j.columns[2])});
 }
-
-namespace {
-
-constexpr int kMaxImplausible = 5;  // in a row; more: the encoders have lost their reference
-constexpr double kSlack = 0.002;    // m, beyond the fastest hand's motion
-constexpr std::int64_t kHaltReply = 20'000'000;  // ns
-constexpr int kHaltTries = 3;
-
-}  // namespace
 
 FalconDriver::FalconDriver(std::unique_ptr<Transport> transport, const DriverSettings& settings)
     : transport_(std::move(transport)), settings_(settings) {
@@ -396,81 +463,6 @@ void Falcon2Device::write(const Vec3& device1, const Vec3& device2) noexcept {
   tip_->push(lost_ ? Vec3(0) : device1);
   tail_->push(lost_ ? Vec3(0) : stylus_.to_tail_frame(device2));
 }
-
-namespace {
-
-std::int64_t unix_ns() {
-  return std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1);
-}
-
-Calibration calibration_in(const std::string& path) {
-  return path.empty() ? Calibration{} : read_calibration(path);
-}
-
-std::optional<FirmwareImage> image_in(const std::string& path) {
-  if (path.empty()) return std::nullopt;
-  return read_image(path);
-}
-
-/// \throws InputError if the calibration has no registration of these two.
-const PairRegistration& registration_in(const Calibration& calibration,
-                                        const servo::DeviceConfig& config) {
-  const std::string &tip = config.serials[0], &tail = config.serials[1];
-  if (const PairRegistration* pair = calibration.pair_of(tip, tail)) return *pair;
-  throw protocols::InputError(
-      {{config.calibration.empty() ? "(no calibration file)" : config.calibration, "/pairs",
-        "expected a registration of the Falcons " + tip + " (tip) and " + tail +
-            " (tail), which gives their relative pose: run "
-            "palpate devices --calibrate --device falcon2"}});
-}
-
-CalibrationVerdict judge(const Calibration& calibration, const std::vector<std::string>& serials) {
-  CalibrationVerdict verdict = judge_forces(calibration, serials, unix_ns());
-  if (serials.size() == 2) {
-    verdict = both(verdict, judge_pair(calibration, serials[0], serials[1], unix_ns()));
-  }
-  return verdict;
-}
-
-/// The text for DeviceCapabilities; empty: missing.
-std::string summary_of(const CalibrationVerdict& verdict) {
-  switch (verdict.state) {
-    case CalibrationState::good:
-      return verdict.text;
-    case CalibrationState::stale:
-      return "stale: " + verdict.text;
-    case CalibrationState::implausible:
-      return "implausible: " + verdict.text;
-    case CalibrationState::missing:
-      return "";
-  }
-  return "";
-}
-
-servo::DeviceCapabilities nominal(const char* name, int freedom) {
-  servo::DeviceCapabilities can;
-  can.name = name;
-  can.sensed_freedom = can.actuated_freedom = freedom;
-  can.max_stiffness = kMaxStiffness;
-  can.max_rate = kMaxRate;
-  can.workspace_radius = kWorkspaceRadius;
-  can.resolution = kResolution;
-  return can;
-}
-
-void show_progress(const std::string& serial, const BootProgress& progress) {
-  if (isatty(STDERR_FILENO) == 0) return;
-  using Step = BootProgress::Step;
-  if (progress.step == Step::monitor && progress.attempt > 1) {
-    std::cerr << "\n  " << printable(progress.trouble) << "; attempt " << progress.attempt << "\n";
-  }
-  if (progress.step != Step::uploading) return;
-  std::cerr << "\rFalcon " << printable(serial) << ": firmware "
-            << 100 * progress.sent / progress.size << " %"
-            << (progress.sent == progress.size ? "\n" : "") << std::flush;
-}
-
-}  // namespace
 
 servo::DeviceCapabilities nominal_falcon(const servo::DeviceConfig& /*config*/) {
   return nominal("falcon", 3);

@@ -51,72 +51,6 @@ void find(void* handle, const char* name, Function& function) {
   function = reinterpret_cast<Function>(dlsym(handle, name));
 }
 
-}  // namespace
-
-void Library::Unload::operator()(void* handle) const { dlclose(handle); }
-
-Library::Library(const std::string& path) {
-  std::string tried;
-  for (const std::string& place : places_of(path)) {
-    handle_.reset(dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL));
-    if (handle_) break;
-    const char* const why = dlerror();
-    tried += "\n  " + (why != nullptr ? std::string(why) : place);
-  }
-  if (!handle_)
-    throw std::runtime_error(
-        "Force Dimension's library cannot be loaded; install the maker's SDK, then set FDSDK to "
-        "its "
-        "folder or name libdrd.so with --library. Tried:" +
-        tried);
-  void* const from = handle_.get();
-  std::string missing;
-  const auto require = [&](const char* name, auto& function) {
-    find(from, name, function);
-    if (function == nullptr) missing += std::string(missing.empty() ? "" : ", ") + name;
-  };
-  require("dhdGetSDKVersion", get_sdk_version);
-  require("dhdGetDeviceCount", get_device_count);
-  require("dhdOpenID", open_id);
-  require("dhdClose", close);
-  require("dhdGetSerialNumber", get_serial_number);
-  require("dhdGetSystemName", get_system_name);
-  require("dhdGetStatus", get_status);
-  require("dhdHasWrist", has_wrist);
-  require("dhdHasActiveWrist", has_active_wrist);
-  require("dhdHasGripper", has_gripper);
-  require("dhdGetPositionAndOrientationFrame", get_position_and_frame);
-  require("dhdSetForceAndTorque", set_force_and_torque);
-  require("dhdEnableForce", enable_force);
-  require("dhdSetBrakes", set_brakes);
-  require("dhdSetGravityCompensation", set_gravity_compensation);
-  require("dhdGetButtonMask", get_button_mask);
-  require("dhdEnableExpertMode", enable_expert_mode);
-  require("dhdSetTimeGuard", set_time_guard);
-  require("dhdErrorGetLast", error_get_last);
-  require("dhdErrorGetLastStr", error_get_last_str);
-  find(from, "dhdSetWatchdog", set_watchdog);
-  find(from, "dhdEmulateButton", emulate_button);
-  find(from, "drdOpenID", open_to_regulate);
-  find(from, "drdIsInitialized", is_initialized);
-  find(from, "drdAutoInit", auto_init);
-  find(from, "drdStop", stop_regulation);
-  if (!missing.empty())
-    throw std::runtime_error(
-        "this is not a Force Dimension library that palpate can use (SDK 3.7 or newer): it has "
-        "no " +
-        missing);
-}
-
-std::string Library::version() const {
-  int major = 0, minor = 0, release = 0, revision = 0;
-  get_sdk_version(&major, &minor, &release, &revision);
-  return std::to_string(major) + "." + std::to_string(minor) + "." + std::to_string(release) + "." +
-         std::to_string(revision);
-}
-
-namespace {
-
 constexpr double kWatchdogStep = 125e-6;  // s; at most 255 of them
 constexpr unsigned char kWatchdogWhileMoving =
     200;                                       // steps: 25 ms, the library's thread may be late
@@ -235,6 +169,68 @@ Found open_wanted(const Library& library, int (*open_id)(char index),
 }
 
 }  // namespace
+
+void Library::Unload::operator()(void* handle) const { dlclose(handle); }
+
+Library::Library(const std::string& path) {
+  std::string tried;
+  for (const std::string& place : places_of(path)) {
+    handle_.reset(dlopen(place.c_str(), RTLD_NOW | RTLD_LOCAL));
+    if (handle_) break;
+    const char* const why = dlerror();
+    tried += "\n  " + (why != nullptr ? std::string(why) : place);
+  }
+  if (!handle_)
+    throw std::runtime_error(
+        "Force Dimension's library cannot be loaded; install the maker's SDK, then set FDSDK to "
+        "its "
+        "folder or name libdrd.so with --library. Tried:" +
+        tried);
+  void* const from = handle_.get();
+  std::string missing;
+  const auto require = [&](const char* name, auto& function) {
+    find(from, name, function);
+    if (function == nullptr) missing += std::string(missing.empty() ? "" : ", ") + name;
+  };
+  require("dhdGetSDKVersion", get_sdk_version);
+  require("dhdGetDeviceCount", get_device_count);
+  require("dhdOpenID", open_id);
+  require("dhdClose", close);
+  require("dhdGetSerialNumber", get_serial_number);
+  require("dhdGetSystemName", get_system_name);
+  require("dhdGetStatus", get_status);
+  require("dhdHasWrist", has_wrist);
+  require("dhdHasActiveWrist", has_active_wrist);
+  require("dhdHasGripper", has_gripper);
+  require("dhdGetPositionAndOrientationFrame", get_position_and_frame);
+  require("dhdSetForceAndTorque", set_force_and_torque);
+  require("dhdEnableForce", enable_force);
+  require("dhdSetBrakes", set_brakes);
+  require("dhdSetGravityCompensation", set_gravity_compensation);
+  require("dhdGetButtonMask", get_button_mask);
+  require("dhdEnableExpertMode", enable_expert_mode);
+  require("dhdSetTimeGuard", set_time_guard);
+  require("dhdErrorGetLast", error_get_last);
+  require("dhdErrorGetLastStr", error_get_last_str);
+  find(from, "dhdSetWatchdog", set_watchdog);
+  find(from, "dhdEmulateButton", emulate_button);
+  find(from, "drdOpenID", open_to_regulate);
+  find(from, "drdIsInitialized", is_initialized);
+  find(from, "drdAutoInit", auto_init);
+  find(from, "drdStop", stop_regulation);
+  if (!missing.empty())
+    throw std::runtime_error(
+        "this is not a Force Dimension library that palpate can use (SDK 3.7 or newer): it has "
+        "no " +
+        missing);
+}
+
+std::string Library::version() const {
+  int major = 0, minor = 0, release = 0, revision = 0;
+  get_sdk_version(&major, &minor, &release, &revision);
+  return std::to_string(major) + "." + std::to_string(minor) + "." + std::to_string(release) + "." +
+         std::to_string(revision);
+}
 
 ForceDimensionDevice::ForceDimensionDevice(const servo::DeviceConfig& config)
     : config_(config), library_(config.library) {

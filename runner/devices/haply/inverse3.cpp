@@ -23,6 +23,17 @@ using Json = nlohmann::json;
 constexpr std::array<const char*, 3> kGrips = {"verse_grip", "wireless_verse_grip",
                                                "custom_verse_grip"};
 
+const Json* member(const Json& of, const char* name) {
+  if (!of.is_object()) return nullptr;
+  const auto found = of.find(name);
+  return found != of.end() ? &*found : nullptr;
+}
+
+std::string text(const Json& of, const char* name, const std::string& otherwise = "") {
+  const Json* const found = member(of, name);
+  return found != nullptr && found->is_string() ? found->get<std::string>() : otherwise;
+}
+
 Json parsed(std::string_view text, const char* what) {
   Json out = json_or_discarded(text);
   if (!out.is_object())
@@ -41,12 +52,6 @@ Json data_of(std::string_view reply, const char* what) {
   return data != all.end() ? *data : Json::object();
 }
 
-const Json* member(const Json& of, const char* name) {
-  if (!of.is_object()) return nullptr;
-  const auto found = of.find(name);
-  return found != of.end() ? &*found : nullptr;
-}
-
 double number(const Json& of, const char* name) {
   const Json* const found = member(of, name);
   return found != nullptr && found->is_number() ? found->get<double>() : std::nan("");
@@ -57,11 +62,6 @@ bool flag(const Json& of, const char* name, bool otherwise) {
   if (found == nullptr) return otherwise;
   if (found->is_boolean()) return found->get<bool>();
   return found->is_number() ? found->get<double>() != 0 : otherwise;
-}
-
-std::string text(const Json& of, const char* name, const std::string& otherwise = "") {
-  const Json* const found = member(of, name);
-  return found != nullptr && found->is_string() ? found->get<std::string>() : otherwise;
 }
 
 std::optional<Vec3> vector(const Json& of, const char* name) {
@@ -154,6 +154,97 @@ std::uint8_t buttons_of(const Json& state) {
     for (const char* name : {"a", "b", "c"}) out |= (flag(*named, name, false) ? 1U : 0U) << bit++;
   }
   return static_cast<std::uint8_t>(out);
+}
+
+constexpr std::int64_t kExchange_ns = 250'000;
+constexpr std::int64_t kSilent_ns = 25'000'000;      // without a state: the device counts as silent
+constexpr std::int64_t kStale_ns = 500'000'000;      // the same state although forces change
+constexpr std::int64_t kUnheeded_ns = 200'000'000;   // a sent force that is not reported
+constexpr double kHeeded = 0.1, kFelt = 0.3;         // share of the force; least force checked, N
+constexpr double kFarthest = 0.5;                    // m; no model reaches so far
+constexpr double kMaxSpeed = 5, kJump = 1e-3;        // m/s and m
+constexpr auto kPatience = std::chrono::seconds(2);  // for the list of devices
+constexpr auto kWait = std::chrono::milliseconds(5);  // for a reply, before a look at quit_
+constexpr int kWaitsUntilZero = 3;                    // without a reply the force becomes zero
+constexpr std::int64_t kFullState_ns = 100'000'000;   // between two looks at the configuration
+constexpr int kFullStates = 20;                       // asked for before a preset counts as ignored
+constexpr int kMostUnanswered = 20;                   // zeros sent to such a service
+
+// A reseller's numbers; the reach is the limit in the maker's tutorials.
+constexpr double kMaxForce = 4, kMaxStiffness = 1000, kReach = 0.1, kResolution = 1e-5;
+
+std::string service_of(const servo::DeviceConfig& config) {
+  return config.service.empty() ? kService : config.service;
+}
+
+std::string advice_for(const std::string& service, const std::string& why) {
+  return "Haply's Inverse Service at " + service + " cannot be used: " + why +
+         "; is it running? (--service HOST:PORT names another)";
+}
+
+/// The first message of a new connection.
+Inventory inventory_of(Link& link) {
+  std::string_view message;
+  if (!link.receive(message, kPatience)) throw LinkError("it sent no list of devices");
+  return parse_inventory(message);
+}
+
+/// What the service tells of the arm after a message; none: nothing of its configuration.
+std::optional<Listed> asked(Link& link, const std::string& message, const std::string& arm) {
+  link.send(message);
+  std::string_view reply;
+  if (!link.receive(reply, kPatience)) throw LinkError("it does not answer");
+  const Json all = parsed(reply, "a state");
+  bool told = false;
+  each(all, "inverse3", [&](const Json& one) {
+    told = told || (text(one, "device_id") == arm && member(one, "config") != nullptr);
+  });
+  if (!told) return std::nullopt;
+  for (Listed& one : parse_inventory(reply).arms)
+    if (one.id == arm) return std::move(one);
+  return std::nullopt;
+}
+
+/// Sets the preset in the form of the service's version, else in the other, and reads it back.
+/// Nothing is commanded meanwhile. \throws std::runtime_error naming what is not as it must be
+Listed configure(Link& link, const std::string& arm, const ServiceVersion& version,
+                 Dialect dialect) {
+  const bool documented = version.major > 3 || version.minor >= 5;
+  std::optional<Listed> told;
+  for (const bool first : {true, false}) {
+    const PresetForm form = documented == first ? PresetForm::object : PresetForm::name;
+    std::string message = configuration(arm, form);
+    for (int i = 0; i < kFullStates; ++i) {
+      if (std::optional<Listed> now = asked(link, message, arm)) told = std::move(now);
+      // An older service may report no preset: then send both forms, and look at the rest.
+      if (told && told->preset == kPreset) return *told;
+      message = command(arm, Vec3(0), dialect, true);
+      servo::RealClock clock;
+      clock.wait_until(clock.now_ns() + 5'000'000);
+    }
+  }
+  if (!told)
+    throw std::runtime_error("it does not tell the configuration of the Inverse3 '" +
+                             printable(arm) + "', so its axes and its origin are unknown");
+  if (told->preset.empty() && !documented) return *told;
+  throw std::runtime_error("the Inverse3 '" + printable(arm) + "' does not take the preset '" +
+                           kPreset + "' and stays in '" +
+                           (told->preset.empty() ? "not told" : printable(told->preset)) +
+                           "', so its origin is not in the middle of its reach: set that preset "
+                           "in the maker's program");
+}
+
+servo::DeviceCapabilities capabilities_of(bool grip) {
+  servo::DeviceCapabilities can;
+  can.name = "inverse3";
+  can.sensed_freedom = grip ? 5 : 3;
+  can.actuated_freedom = 3;
+  can.max_force = kMaxForce;
+  can.max_stiffness = kMaxStiffness;
+  can.max_rate = 1000;
+  can.workspace_radius = kReach;
+  can.resolution = kResolution;
+  return can;
 }
 
 }  // namespace
@@ -279,101 +370,6 @@ std::string configuration(const std::string& arm, PresetForm form) {
   return Json{{"session", session}, {"inverse3", Json::array({one})}}.dump(
       -1, ' ', true, Json::error_handler_t::replace);
 }
-
-namespace {
-
-constexpr std::int64_t kExchange_ns = 250'000;
-constexpr std::int64_t kSilent_ns = 25'000'000;      // without a state: the device counts as silent
-constexpr std::int64_t kStale_ns = 500'000'000;      // the same state although forces change
-constexpr std::int64_t kUnheeded_ns = 200'000'000;   // a sent force that is not reported
-constexpr double kHeeded = 0.1, kFelt = 0.3;         // share of the force; least force checked, N
-constexpr double kFarthest = 0.5;                    // m; no model reaches so far
-constexpr double kMaxSpeed = 5, kJump = 1e-3;        // m/s and m
-constexpr auto kPatience = std::chrono::seconds(2);  // for the list of devices
-constexpr auto kWait = std::chrono::milliseconds(5);  // for a reply, before a look at quit_
-constexpr int kWaitsUntilZero = 3;                    // without a reply the force becomes zero
-constexpr std::int64_t kFullState_ns = 100'000'000;   // between two looks at the configuration
-constexpr int kFullStates = 20;                       // asked for before a preset counts as ignored
-constexpr int kMostUnanswered = 20;                   // zeros sent to such a service
-
-// A reseller's numbers; the reach is the limit in the maker's tutorials.
-constexpr double kMaxForce = 4, kMaxStiffness = 1000, kReach = 0.1, kResolution = 1e-5;
-
-std::string service_of(const servo::DeviceConfig& config) {
-  return config.service.empty() ? kService : config.service;
-}
-
-std::string advice_for(const std::string& service, const std::string& why) {
-  return "Haply's Inverse Service at " + service + " cannot be used: " + why +
-         "; is it running? (--service HOST:PORT names another)";
-}
-
-/// The first message of a new connection.
-Inventory inventory_of(Link& link) {
-  std::string_view message;
-  if (!link.receive(message, kPatience)) throw LinkError("it sent no list of devices");
-  return parse_inventory(message);
-}
-
-/// What the service tells of the arm after a message; none: nothing of its configuration.
-std::optional<Listed> asked(Link& link, const std::string& message, const std::string& arm) {
-  link.send(message);
-  std::string_view reply;
-  if (!link.receive(reply, kPatience)) throw LinkError("it does not answer");
-  const Json all = parsed(reply, "a state");
-  bool told = false;
-  each(all, "inverse3", [&](const Json& one) {
-    told = told || (text(one, "device_id") == arm && member(one, "config") != nullptr);
-  });
-  if (!told) return std::nullopt;
-  for (Listed& one : parse_inventory(reply).arms)
-    if (one.id == arm) return std::move(one);
-  return std::nullopt;
-}
-
-/// Sets the preset in the form of the service's version, else in the other, and reads it back.
-/// Nothing is commanded meanwhile. \throws std::runtime_error naming what is not as it must be
-Listed configure(Link& link, const std::string& arm, const ServiceVersion& version,
-                 Dialect dialect) {
-  const bool documented = version.major > 3 || version.minor >= 5;
-  std::optional<Listed> told;
-  for (const bool first : {true, false}) {
-    const PresetForm form = documented == first ? PresetForm::object : PresetForm::name;
-    std::string message = configuration(arm, form);
-    for (int i = 0; i < kFullStates; ++i) {
-      if (std::optional<Listed> now = asked(link, message, arm)) told = std::move(now);
-      // An older service may report no preset: then send both forms, and look at the rest.
-      if (told && told->preset == kPreset) return *told;
-      message = command(arm, Vec3(0), dialect, true);
-      servo::RealClock clock;
-      clock.wait_until(clock.now_ns() + 5'000'000);
-    }
-  }
-  if (!told)
-    throw std::runtime_error("it does not tell the configuration of the Inverse3 '" +
-                             printable(arm) + "', so its axes and its origin are unknown");
-  if (told->preset.empty() && !documented) return *told;
-  throw std::runtime_error("the Inverse3 '" + printable(arm) + "' does not take the preset '" +
-                           kPreset + "' and stays in '" +
-                           (told->preset.empty() ? "not told" : printable(told->preset)) +
-                           "', so its origin is not in the middle of its reach: set that preset "
-                           "in the maker's program");
-}
-
-servo::DeviceCapabilities capabilities_of(bool grip) {
-  servo::DeviceCapabilities can;
-  can.name = "inverse3";
-  can.sensed_freedom = grip ? 5 : 3;
-  can.actuated_freedom = 3;
-  can.max_force = kMaxForce;
-  can.max_stiffness = kMaxStiffness;
-  can.max_rate = 1000;
-  can.workspace_radius = kReach;
-  can.resolution = kResolution;
-  return can;
-}
-
-}  // namespace
 
 Pump::Pump(std::unique_ptr<Link> link, const Settings& settings)
     : link_(std::move(link)), settings_(settings), thread_([this] { run(); }) {}

@@ -34,48 +34,6 @@ void* load(const std::string& path) {
       tried);
 }
 
-}  // namespace
-
-const Library& Library::get(const std::string& path) {
-  static const Library library(path);
-  return library;
-}
-
-Library::Library(const std::string& path) {
-  void* const from = load(path);
-  std::string missing;
-  const auto require = [&](const char* name, auto& function) {
-    function = reinterpret_cast<std::remove_reference_t<decltype(function)>>(dlsym(from, name));
-    if (function == nullptr) missing += std::string(missing.empty() ? "" : ", ") + name;
-  };
-  require("hdInitDevice", init_device);
-  require("hdDisableDevice", disable_device);
-  require("hdMakeCurrentDevice", make_current);
-  require("hdBeginFrame", begin_frame);
-  require("hdEndFrame", end_frame);
-  require("hdEnable", enable);
-  require("hdIsEnabled", is_enabled);
-  require("hdGetDoublev", get_doubles);
-  require("hdGetIntegerv", get_integers);
-  require("hdSetDoublev", set_doubles);
-  require("hdGetString", get_string);
-  require("hdGetError", get_error);
-  require("hdGetErrorString", error_string);
-  require("hdCheckCalibration", check_calibration);
-  require("hdUpdateCalibration", update_calibration);
-  require("hdSetSchedulerRate", set_rate);
-  require("hdStartScheduler", start);
-  require("hdStopScheduler", stop);
-  require("hdScheduleAsynchronous", schedule);
-  require("hdUnschedule", unschedule);
-  if (!missing.empty())
-    throw std::runtime_error(
-        "this is not an OpenHaptics library that palpate can use (3.0 or newer): it has no " +
-        missing);
-}
-
-namespace {
-
 constexpr unsigned long kSchedulerRate = 1000;      // Hz
 constexpr unsigned short kPriority = 0xFFFF;        // the highest
 constexpr std::int64_t kSilent_ns = 25'000'000;     // without a call: the device counts as silent
@@ -143,6 +101,44 @@ servo::DeviceCapabilities capabilities_of() {
 }
 
 }  // namespace
+
+const Library& Library::get(const std::string& path) {
+  static const Library library(path);
+  return library;
+}
+
+Library::Library(const std::string& path) {
+  void* const from = load(path);
+  std::string missing;
+  const auto require = [&](const char* name, auto& function) {
+    function = reinterpret_cast<std::remove_reference_t<decltype(function)>>(dlsym(from, name));
+    if (function == nullptr) missing += std::string(missing.empty() ? "" : ", ") + name;
+  };
+  require("hdInitDevice", init_device);
+  require("hdDisableDevice", disable_device);
+  require("hdMakeCurrentDevice", make_current);
+  require("hdBeginFrame", begin_frame);
+  require("hdEndFrame", end_frame);
+  require("hdEnable", enable);
+  require("hdIsEnabled", is_enabled);
+  require("hdGetDoublev", get_doubles);
+  require("hdGetIntegerv", get_integers);
+  require("hdSetDoublev", set_doubles);
+  require("hdGetString", get_string);
+  require("hdGetError", get_error);
+  require("hdGetErrorString", error_string);
+  require("hdCheckCalibration", check_calibration);
+  require("hdUpdateCalibration", update_calibration);
+  require("hdSetSchedulerRate", set_rate);
+  require("hdStartScheduler", start);
+  require("hdStopScheduler", stop);
+  require("hdScheduleAsynchronous", schedule);
+  require("hdUnschedule", unschedule);
+  if (!missing.empty())
+    throw std::runtime_error(
+        "this is not an OpenHaptics library that palpate can use (3.0 or newer): it has no " +
+        missing);
+}
 
 TouchDevice::TouchDevice(const servo::DeviceConfig& config)
     : config_(config),

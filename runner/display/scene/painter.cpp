@@ -12,6 +12,7 @@
 #include "runner/display/scene/scene_renderer.h"
 
 namespace palpate::runner::display {
+namespace {
 
 // OpenGL without a display.
 
@@ -29,8 +30,6 @@ class OffscreenContext {
   void* context_ = nullptr;
 };
 
-namespace {
-
 [[noreturn]] void refuse(const std::string& why) {
   throw DisplayError("no pictures can be drawn without a display: " + why +
                      "; Debian's packages libegl1 and libgl1-mesa-dri draw on any computer");
@@ -45,8 +44,6 @@ EGLDisplay surfaceless_display() {
                                     static_cast<void*>(EGL_DEFAULT_DISPLAY), nullptr);
   return eglGetDisplay(EGL_DEFAULT_DISPLAY);
 }
-
-}  // namespace
 
 OffscreenContext::OffscreenContext() {
   // libepoxy ends the program if it does not find the library.
@@ -82,8 +79,6 @@ OffscreenContext::~OffscreenContext() {
   eglDestroyContext(display_, context_);
   eglTerminate(display_);
 }
-
-namespace {
 
 class OffscreenPainter final : public ScenePainter {
  public:

@@ -15,37 +15,6 @@
 #include "stimuli/shapes.h"
 
 namespace palpate::runner::display {
-
-const Theme& light_theme() {
-  static const Theme theme{.above = {0.87F, 0.90F, 0.93F},
-                           .below = {0.97F, 0.97F, 0.965F},
-                           .ground = {0.955F, 0.957F, 0.96F},
-                           .text = {0.16F, 0.18F, 0.22F},
-                           .halo = {1, 1, 1},
-                           .ideal_tool = {0.22F, 0.24F, 0.29F},
-                           .virtual_tool = {0.95F, 0.52F, 0.13F},
-                           .grip = {0.36F, 0.38F, 0.43F},
-                           .force = {0.86F, 0.16F, 0.16F},
-                           .torque = {0.48F, 0.20F, 0.72F},
-                           .contact = {0.93F, 0.12F, 0.20F}};
-  return theme;
-}
-
-const Theme& dark_theme() {
-  static const Theme theme{.above = {0.085F, 0.098F, 0.115F},
-                           .below = {0.13F, 0.15F, 0.175F},
-                           .ground = {0.15F, 0.17F, 0.195F},
-                           .text = {0.90F, 0.91F, 0.92F},
-                           .halo = {0.06F, 0.07F, 0.08F},
-                           .ideal_tool = {0.93F, 0.91F, 0.87F},
-                           .virtual_tool = {0.95F, 0.55F, 0.25F},
-                           .grip = {0.60F, 0.62F, 0.66F},
-                           .force = {0.97F, 0.78F, 0.26F},
-                           .torque = {0.72F, 0.52F, 0.95F},
-                           .contact = {0.95F, 0.35F, 0.30F}};
-  return theme;
-}
-
 namespace {
 
 constexpr float kBetween = 2;  // px
@@ -57,33 +26,6 @@ bool overlap(const LabelBox& a, const LabelBox& b) {
   return apart.x < least.x && apart.y < least.y;
 }
 
-}  // namespace
-
-void place_labels(std::vector<LabelBox>& boxes, const glm::vec2& picture) {
-  std::ranges::stable_sort(boxes, {}, &LabelBox::distance);
-  for (std::size_t i = 0; i < boxes.size(); ++i) {
-    LabelBox& box = boxes[i];
-    const glm::vec2 wanted = box.centre, low = 0.5F * box.size, high = picture - low;
-    const bool near_enough = wanted.x >= 0 && wanted.x <= picture.x && wanted.y >= -picture.y / 4 &&
-                             wanted.y <= picture.y;
-    box.shown = near_enough && low.x <= high.x && low.y <= high.y;
-    bool free = false;
-    // Try rows above and below its place, at growing distance.
-    for (int k = 0; box.shown && !free && k <= 2 * kMostRows; ++k) {
-      const int rows = (k + 1) / 2 * (k % 2 == 1 ? -1 : 1);
-      const glm::vec2 moved =
-          wanted + glm::vec2(0, static_cast<float>(rows) * (box.size.y + kBetween));
-      box.centre = glm::clamp(moved, low, high);
-      free =
-          std::none_of(boxes.begin(), boxes.begin() + static_cast<std::ptrdiff_t>(i),
-                       [&](const LabelBox& other) { return other.shown && overlap(box, other); });
-    }
-    box.shown = box.shown && free;
-  }
-}
-
-namespace {
-
 constexpr int kArcSteps = 42;
 constexpr float kHeadLength = 4.6F, kHeadRadius = 2.1F;  // of the shaft's radius
 
@@ -92,46 +34,6 @@ glm::vec3 aside_of(const glm::vec3& z) {
   const glm::vec3 other = std::abs(z.x) < 0.7F ? glm::vec3(1, 0, 0) : glm::vec3(0, 1, 0);
   return glm::normalize(glm::cross(other, z));
 }
-
-}  // namespace
-
-glm::mat4 rod_place(const glm::vec3& from, const glm::vec3& to, float radius) {
-  const glm::vec3 axis = to - from;
-  const float length = glm::length(axis);
-  const glm::vec3 z = length > 0 ? axis / length : glm::vec3(0, 0, 1);
-  const glm::vec3 x = aside_of(z), y = glm::cross(z, x);
-  return {glm::vec4(radius * x, 0), glm::vec4(radius * y, 0),
-          glm::vec4(std::max(length, 1e-3F * radius) * z, 0), glm::vec4(from, 1)};
-}
-
-float radius_seen(const DrawnRod& rod, const Camera& camera) {
-  if (rod.thickest == 0) return rod.radius;
-  const float height = std::min(camera.height_at(rod.from), camera.height_at(rod.to));
-  return std::min(rod.radius, 0.5F * rod.thickest * height);
-}
-
-glm::mat4 ball_place(const glm::vec3& centre, float radius) {
-  return glm::scale(glm::translate(glm::mat4(1), centre), glm::vec3(radius));
-}
-
-ArrowPlaces arrow_places(const glm::vec3& from, const glm::vec3& to, float radius) {
-  const float length = glm::distance(from, to);
-  const float head = std::min(kHeadLength * radius, 0.5F * length);
-  const glm::vec3 neck = length > 0 ? to - head / length * (to - from) : to;
-  return {rod_place(from, neck, radius), rod_place(neck, to, kHeadRadius / kHeadLength * head)};
-}
-
-std::vector<glm::vec3> points_of(const DrawnTurn& turn) {
-  const glm::vec3 x = aside_of(turn.axis), y = glm::cross(turn.axis, x);
-  std::vector<glm::vec3> out;
-  for (int i = 0; i <= kArcSteps; ++i) {
-    const float angle = turn.sweep * static_cast<float>(i) / static_cast<float>(kArcSteps);
-    out.push_back(turn.centre + turn.radius * (std::cos(angle) * x + std::sin(angle) * y));
-  }
-  return out;
-}
-
-namespace {
 
 /// \param side  +x of the tool; zero: the side at the beginning of a trial
 DrawnTool placed(const rendering::Tool& tool, const rendering::LineProbe& stylus,
@@ -147,19 +49,6 @@ DrawnTool placed(const rendering::Tool& tool, const rendering::LineProbe& stylus
     out.segments.push_back({stylus.tip + frame * segment.from, stylus.tip + frame * segment.to});
   return out;
 }
-
-}  // namespace
-
-DrawnTool tool_in_hand(const rendering::Tool& tool, const servo::Sample& sample) {
-  return placed(tool, sample.probe, sample.rendering.ideal_side);
-}
-
-DrawnTool ideal_tool(const rendering::Tool& tool, const servo::Sample& sample) {
-  if (sample.rendering.contacts == 0) return tool_in_hand(tool, sample);
-  return placed(tool, sample.rendering.ideal, sample.rendering.ideal_side);
-}
-
-namespace {
 
 constexpr std::array<glm::vec3, 8> kObjectColours{{{0.42F, 0.60F, 0.83F},
                                                    {0.87F, 0.56F, 0.42F},
@@ -245,6 +134,104 @@ std::string caption_of(const SceneMoment& moment, double grid) {
 }
 
 }  // namespace
+
+const Theme& light_theme() {
+  static const Theme theme{.above = {0.87F, 0.90F, 0.93F},
+                           .below = {0.97F, 0.97F, 0.965F},
+                           .ground = {0.955F, 0.957F, 0.96F},
+                           .text = {0.16F, 0.18F, 0.22F},
+                           .halo = {1, 1, 1},
+                           .ideal_tool = {0.22F, 0.24F, 0.29F},
+                           .virtual_tool = {0.95F, 0.52F, 0.13F},
+                           .grip = {0.36F, 0.38F, 0.43F},
+                           .force = {0.86F, 0.16F, 0.16F},
+                           .torque = {0.48F, 0.20F, 0.72F},
+                           .contact = {0.93F, 0.12F, 0.20F}};
+  return theme;
+}
+
+const Theme& dark_theme() {
+  static const Theme theme{.above = {0.085F, 0.098F, 0.115F},
+                           .below = {0.13F, 0.15F, 0.175F},
+                           .ground = {0.15F, 0.17F, 0.195F},
+                           .text = {0.90F, 0.91F, 0.92F},
+                           .halo = {0.06F, 0.07F, 0.08F},
+                           .ideal_tool = {0.93F, 0.91F, 0.87F},
+                           .virtual_tool = {0.95F, 0.55F, 0.25F},
+                           .grip = {0.60F, 0.62F, 0.66F},
+                           .force = {0.97F, 0.78F, 0.26F},
+                           .torque = {0.72F, 0.52F, 0.95F},
+                           .contact = {0.95F, 0.35F, 0.30F}};
+  return theme;
+}
+
+void place_labels(std::vector<LabelBox>& boxes, const glm::vec2& picture) {
+  std::ranges::stable_sort(boxes, {}, &LabelBox::distance);
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    LabelBox& box = boxes[i];
+    const glm::vec2 wanted = box.centre, low = 0.5F * box.size, high = picture - low;
+    const bool near_enough = wanted.x >= 0 && wanted.x <= picture.x && wanted.y >= -picture.y / 4 &&
+                             wanted.y <= picture.y;
+    box.shown = near_enough && low.x <= high.x && low.y <= high.y;
+    bool free = false;
+    // Try rows above and below its place, at growing distance.
+    for (int k = 0; box.shown && !free && k <= 2 * kMostRows; ++k) {
+      const int rows = (k + 1) / 2 * (k % 2 == 1 ? -1 : 1);
+      const glm::vec2 moved =
+          wanted + glm::vec2(0, static_cast<float>(rows) * (box.size.y + kBetween));
+      box.centre = glm::clamp(moved, low, high);
+      free =
+          std::none_of(boxes.begin(), boxes.begin() + static_cast<std::ptrdiff_t>(i),
+                       [&](const LabelBox& other) { return other.shown && overlap(box, other); });
+    }
+    box.shown = box.shown && free;
+  }
+}
+
+glm::mat4 rod_place(const glm::vec3& from, const glm::vec3& to, float radius) {
+  const glm::vec3 axis = to - from;
+  const float length = glm::length(axis);
+  const glm::vec3 z = length > 0 ? axis / length : glm::vec3(0, 0, 1);
+  const glm::vec3 x = aside_of(z), y = glm::cross(z, x);
+  return {glm::vec4(radius * x, 0), glm::vec4(radius * y, 0),
+          glm::vec4(std::max(length, 1e-3F * radius) * z, 0), glm::vec4(from, 1)};
+}
+
+float radius_seen(const DrawnRod& rod, const Camera& camera) {
+  if (rod.thickest == 0) return rod.radius;
+  const float height = std::min(camera.height_at(rod.from), camera.height_at(rod.to));
+  return std::min(rod.radius, 0.5F * rod.thickest * height);
+}
+
+glm::mat4 ball_place(const glm::vec3& centre, float radius) {
+  return glm::scale(glm::translate(glm::mat4(1), centre), glm::vec3(radius));
+}
+
+ArrowPlaces arrow_places(const glm::vec3& from, const glm::vec3& to, float radius) {
+  const float length = glm::distance(from, to);
+  const float head = std::min(kHeadLength * radius, 0.5F * length);
+  const glm::vec3 neck = length > 0 ? to - head / length * (to - from) : to;
+  return {rod_place(from, neck, radius), rod_place(neck, to, kHeadRadius / kHeadLength * head)};
+}
+
+std::vector<glm::vec3> points_of(const DrawnTurn& turn) {
+  const glm::vec3 x = aside_of(turn.axis), y = glm::cross(turn.axis, x);
+  std::vector<glm::vec3> out;
+  for (int i = 0; i <= kArcSteps; ++i) {
+    const float angle = turn.sweep * static_cast<float>(i) / static_cast<float>(kArcSteps);
+    out.push_back(turn.centre + turn.radius * (std::cos(angle) * x + std::sin(angle) * y));
+  }
+  return out;
+}
+
+DrawnTool tool_in_hand(const rendering::Tool& tool, const servo::Sample& sample) {
+  return placed(tool, sample.probe, sample.rendering.ideal_side);
+}
+
+DrawnTool ideal_tool(const rendering::Tool& tool, const servo::Sample& sample) {
+  if (sample.rendering.contacts == 0) return tool_in_hand(tool, sample);
+  return placed(tool, sample.rendering.ideal, sample.rendering.ideal_side);
+}
 
 std::vector<servo::ContactPlace> contact_places(const rendering::Scene& scene,
                                                 const rendering::RenderState& state,
