@@ -406,12 +406,20 @@ InterleavedTracks::InterleavedTracks(const std::vector<ProcedureSpec>& specs, st
   begin_round();
 }
 
+std::vector<std::size_t> round_of_tracks(std::uint64_t seed, std::uint64_t round,
+                                         std::vector<std::size_t> unfinished) {
+  Random(seed, {0x18, round}).shuffle(unfinished);
+  std::ranges::reverse(unfinished);
+  return unfinished;
+}
+
 void InterleavedTracks::begin_round() {
-  round_.clear();
+  std::vector<std::size_t> unfinished;
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
-    if (tracks_[i].next_level()) round_.push_back(i);
+    if (tracks_[i].next_level()) unfinished.push_back(i);
   }
-  Random(seed_, {0x18, rounds_++}).shuffle(round_);
+  round_ = round_of_tracks(seed_, rounds_++, std::move(unfinished));
+  std::ranges::reverse(round_);
 }
 
 std::optional<TrackLevel> InterleavedTracks::next() const {

@@ -149,6 +149,11 @@ struct TrackLevel {
   double level = 0;
 };
 
+/// The order of a round's tracks: every unfinished one, shuffled.
+/// \param seed  of InterleavedTracks \param round  from 0
+std::vector<std::size_t> round_of_tracks(std::uint64_t seed, std::uint64_t round,
+                                         std::vector<std::size_t> unfinished);
+
 /// Several procedures whose trials are mixed: each round has one trial of every unfinished track,
 /// in random order.
 class InterleavedTracks {

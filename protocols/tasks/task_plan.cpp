@@ -412,6 +412,33 @@ bool is_catch_trial(const Protocol& protocol, int participant, std::uint64_t blo
 
 }  // namespace
 
+DrawnTrial drawn_trial(const Protocol& protocol, int participant_number, int block,
+                       std::size_t shown) {
+  const auto index = static_cast<std::uint64_t>(block);
+  const auto intervals = protocol.blocks[static_cast<std::size_t>(block)].intervals;
+  DrawnTrial out;
+  out.catch_trial = is_catch_trial(protocol, participant_number, index, shown);
+  Random random = task_stream(protocol.seed, participant_number, index, kTaskPosition, shown + 1);
+  out.position = static_cast<int>(random.below(static_cast<std::uint64_t>(intervals)));
+  out.orientation = drawn_orientation(
+      protocol, task_stream(protocol.seed, participant_number, index, kTaskOrientation, shown + 1));
+  return out;
+}
+
+std::vector<int> track_order(const Protocol& protocol, int participant_number, int block,
+                             std::uint64_t round) {
+  const auto index = static_cast<std::uint64_t>(block);
+  std::vector<std::size_t> tracks(
+      tracks_of(protocol.blocks[static_cast<std::size_t>(block)]).size());
+  for (std::size_t i = 0; i < tracks.size(); ++i) tracks[i] = i;
+  std::vector<int> out;
+  for (const std::size_t track :
+       round_of_tracks(task_stream(protocol.seed, participant_number, index, kTaskTracks).next(),
+                       round, std::move(tracks)))
+    out.push_back(static_cast<int>(track) + 1);
+  return out;
+}
+
 bool is_adaptive(const TaskBlock& block) {
   return std::any_of(block.procedures.begin(), block.procedures.end(), [](const auto& spec) {
     return !std::holds_alternative<ConstantStimuli>(spec);
@@ -477,6 +504,19 @@ std::vector<int> blocks_in_order(const Protocol& protocol, int participant_numbe
   }
   order.insert(order.end(), last.begin(), last.end());
   return order;
+}
+
+int block_orders(const Protocol& protocol) {
+  int orders = 1;
+  for (int session = 1; protocol.blocks_counterbalanced && session <= protocol.sessions.count;
+       ++session) {
+    const auto blocks =
+        static_cast<int>(std::ranges::count_if(protocol.blocks, [session](const TaskBlock& block) {
+          return block.session == session && !block.practice;
+        }));
+    if (blocks > 1) orders = std::max(orders, latin_square_rows(blocks));
+  }
+  return orders;
 }
 
 TaskPlan::TaskPlan(const Protocol& protocol, int participant_number, int session)
@@ -545,12 +585,9 @@ Trial TaskPlan::adaptive_trial() const {
   trial.renderer = track.renderer;
   trial.track = static_cast<int>(wanted.track) + 1;
   trial.level = wanted.level;
-  trial.catch_trial = is_catch_trial(*protocol_, participant_number_, block_index(), shown_);
-  Random random =
-      task_stream(protocol_->seed, participant_number_, block_index(), kTaskPosition, shown_ + 1);
-  set_intervals(block(),
-                static_cast<int>(random.below(static_cast<std::uint64_t>(block().intervals))),
-                trial);
+  const DrawnTrial drawn = drawn_trial(*protocol_, participant_number_, order_[at_], shown_);
+  trial.catch_trial = drawn.catch_trial;
+  set_intervals(block(), drawn.position, trial);
   return trial;
 }
 

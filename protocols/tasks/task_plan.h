@@ -107,8 +107,25 @@ class TaskPlan {
   std::optional<Trial> next_;
 };
 
+/// What the seed determines of a trial of an adaptive block, whatever the answers are.
+struct DrawnTrial {
+  bool catch_trial = false;
+  int position = 0;  ///< of the comparison, from 0
+  Quat orientation{1, 0, 0, 0};
+};
+/// \param block  index \param shown  from 0, in the block
+DrawnTrial drawn_trial(const Protocol& protocol, int participant_number, int block,
+                       std::size_t shown);
+/// The tracks of an adaptive block, from 1, in the order of a round (from 0) in which none has
+/// ended.
+std::vector<int> track_order(const Protocol& protocol, int participant_number, int block,
+                             std::uint64_t round);
+
 /// The blocks of a session in the order in which a participant gets them: indices.
 std::vector<int> blocks_in_order(const Protocol& protocol, int participant_number, int session);
+/// The number of successive participant numbers after which the orders of blocks repeat; 1: they
+/// are the same for everybody.
+int block_orders(const Protocol& protocol);
 /// Whether another program chooses the stimuli: only `palpate serve` allows one.
 bool is_external(const Protocol& protocol);
 /// Whether answers choose the block's levels.

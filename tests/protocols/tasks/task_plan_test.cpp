@@ -102,6 +102,27 @@ TEST(TaskPlan, FollowsEachStaircaseByItsOwnAnswers) {
   for (const auto& [number, track] : tracks) EXPECT_FALSE(track.next_level().has_value());
 }
 
+TEST(TaskPlan, DrawsTheSameWhateverTheAnswersAre) {
+  const Protocol protocol = parsed(task_study());
+  for (const bool right : {false, true}) {
+    std::size_t shown = 0;
+    for (TaskPlan plan(protocol, 2, 1); !plan.finished();
+         plan.answered({right, right, true, std::nullopt})) {
+      const Trial& trial = plan.next();
+      if (trial.task_block != 1) continue;
+      const DrawnTrial drawn = drawn_trial(protocol, 2, 1, shown);
+      EXPECT_EQ(trial.catch_trial, drawn.catch_trial);
+      EXPECT_EQ(trial.orientation, drawn.orientation);
+      EXPECT_FALSE(trial.intervals.at(static_cast<std::size_t>(drawn.position)).standard);
+      if (shown < 6) {  // no track ends in its first trials
+        EXPECT_EQ(trial.track, track_order(protocol, 2, 1, shown / 2).at(shown % 2));
+      }
+      ++shown;
+    }
+    EXPECT_GT(shown, 6U);
+  }
+}
+
 TEST(TaskPlan, HasTheShareOfCatchTrials) {
   int catches = 0, all = 0;
   std::map<decltype(Trial::renderer), int> of_renderer, catches_of_renderer;
