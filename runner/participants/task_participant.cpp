@@ -8,6 +8,7 @@
 #include <limits>
 #include <string>
 #include <tuple>
+#include <utility>
 
 #include "protocols/parse.h"
 #include "protocols/tasks/levels.h"
@@ -16,8 +17,9 @@
 namespace palpate::runner::participants {
 namespace {
 
-constexpr double kLeastDepth = 2e-4;        // m; below it force over depth is noise
-constexpr double kLevelStep = 1e-3;         // change of the level, for the derivative
+constexpr double kLeastDepth = 2e-4;              // m; below it force over depth is noise
+constexpr double kQuartile = 0.6744897501960817;  // of the normal distribution
+constexpr double kLevelStep = 1e-3;               // change of the level, for the derivative
 constexpr double kLeastSensitivity = 1e-3;  // movement of the surface for that of the level, m/m
 
 double box_distance(const Vec3& size, const Vec3& point) {
@@ -51,8 +53,9 @@ bool is_length(const std::string& pointer) {
   return pointer.ends_with("_m") || pointer.find("_m/") != std::string::npos;
 }
 
-constexpr double kLook = 1.5;       // s of exploration in each interval after the first contact
-constexpr double kLongestLook = 8;  // s, also without contact
+constexpr double kPlannedLook = 0.3;  // s, where a plan says nothing of times
+constexpr double kLook = 1.5;         // s of exploration in each interval after the first contact
+constexpr double kLongestLook = 8;    // s, also without contact
 constexpr std::uint64_t kJudgement = 9;  // random stream; the hand has 1 to 3
 constexpr std::uint64_t kPages = 10;     // likewise
 constexpr int kMostIntervals = 64;       // trials of the hand within one of the session
@@ -198,10 +201,20 @@ int TaskJudgement::index_of(const char* name) const {
   return static_cast<int>(at - answers.begin());
 }
 
+/// The noise with which the threshold of a forced choice lies where it is planned: the distance of
+/// a threshold of 75 % from the standard is 0.6745 of it.
+double TaskJudgement::planned_noise(double noise, double reference) const {
+  if (settings_.threshold_log_ratio == 0 || block().task != TaskKind::compare) return noise;
+  const int side = protocols::side_of_levels(protocol_, block());
+  const double threshold = reference + side * kQuartile * noise;
+  const double planned = threshold * std::exp(settings_.threshold_log_ratio);
+  return std::max(side * (planned - reference) / kQuartile, 1e-3 * noise);
+}
+
 /// Standard deviation, in the level's unit.
 double TaskJudgement::noise_of_difference(double reference) const {
   if (block().level && block().level->orientation) return settings_.turn_sd;
-  if (reference != 0) return settings_.weber * std::abs(reference);
+  if (reference != 0) return planned_noise(settings_.weber * std::abs(reference), reference);
   const std::vector<double> levels = protocols::levels_of(block());
   if (levels.empty()) return 0;
   return settings_.weber * std::max(std::abs(levels.front()), std::abs(levels.back()));
@@ -225,7 +238,8 @@ void TaskJudgement::feel(const protocols::Interval& interval, const Felt& felt) 
   if (const auto levels = protocols::levels_of(block()); !felt.touched && !levels.empty())
     last_level_ = levels.front() + random_.unit() * (levels.back() - levels.front());
   const double sd = felt.noisy ? 0 : noise_of_difference(reference) / std::sqrt(2.0);
-  const double estimate = last_level_ + sd * random_.normal();
+  const double less = interval.standard ? 0 : settings_.shift * noise_of_difference(reference);
+  const double estimate = last_level_ - less + sd * random_.normal();
   estimates_.push_back(estimate);
   (interval.standard ? standard_ : own_) = estimate;
   if (!interval.standard) shown_ = level_of(interval);
@@ -258,8 +272,9 @@ int TaskJudgement::detected() {
       const protocols::PsychometricParticipant typical = protocols::typical_participant(
           protocol_, block(),
           {settings_.threshold, settings_.spread, settings_.false_alarm, settings_.lapse});
-      yes =
-          protocols::psychometric_probability(typical.function, typical.parameters, *trial_.level);
+      yes = protocols::psychometric_probability(
+          typical.function, typical.parameters,
+          *trial_.level * std::exp(-settings_.threshold_log_ratio));
     }
   }
   evidence_ = 4 * std::abs(yes - 0.5);
@@ -282,6 +297,14 @@ int TaskJudgement::adjusted() {
 int TaskJudgement::identified() {
   int found = trial_.stimulus;
   evidence_ = 2;
+  if (settings_.share_correct) {
+    const auto& all = block().answers;
+    const int right = index_of(protocol_.stimuli[static_cast<std::size_t>(found)].name.c_str());
+    if (random_.unit() < *settings_.share_correct || all.size() < 2) return right;
+    const auto count = static_cast<std::uint64_t>(all.size());
+    return static_cast<int>((static_cast<std::uint64_t>(right) + 1 + random_.below(count - 1)) %
+                            count);
+  }
   if (measured_ && !block().level) {
     const auto apart = [&](int stimulus) {
       const double own =
@@ -295,6 +318,19 @@ int TaskJudgement::identified() {
   return index_of(protocol_.stimuli[static_cast<std::size_t>(found)].name.c_str());
 }
 
+/// A step of a scale, from 0.
+int TaskJudgement::rated(std::uint64_t steps) {
+  const auto last = static_cast<double>(steps - 1);
+  // The step nearest to the level's place among all levels.
+  const std::vector<double> levels = protocols::levels_of(block());
+  const double range = levels.empty() ? 0 : levels.back() - levels.front();
+  const double place = range > 0 ? (estimates_.back() - levels.front()) / range : 0.5;
+  double step = std::clamp(place, 0.0, 1.0) * last;
+  if (settings_.rating_sd > 0)
+    step = std::clamp(step + settings_.rating + settings_.rating_sd * random_.normal(), 0.0, last);
+  return static_cast<int>(std::lround(step));
+}
+
 int TaskJudgement::answer() {
   const auto count = static_cast<std::uint64_t>(std::max<std::size_t>(1, block().answers.size()));
   if (block().task == TaskKind::adjust) return adjusted();
@@ -303,14 +339,8 @@ int TaskJudgement::answer() {
   switch (block().task) {
     case TaskKind::compare:
       return compared().value_or(0);
-    case TaskKind::rate: {
-      // The step nearest to the level's place among all levels.
-      const std::vector<double> levels = protocols::levels_of(block());
-      const double range = levels.empty() ? 0 : levels.back() - levels.front();
-      const double place = range > 0 ? (estimates_.back() - levels.front()) / range : 0.5;
-      const double step = std::clamp(place, 0.0, 1.0) * static_cast<double>(count - 1);
-      return static_cast<int>(std::lround(step));
-    }
+    case TaskKind::rate:
+      return rated(count);
     default:
       return identified();
   }
@@ -318,6 +348,12 @@ int TaskJudgement::answer() {
 
 double TaskJudgement::number() {
   const TaskBlock& asked = block();
+  if (settings_.rating_sd > 0) {  // a rating without levels, as of a scale of seven steps
+    const double middle =
+        asked.least && asked.most ? (*asked.least + *asked.most) / 2 : asked.least.value_or(1) + 3;
+    const double rated = middle + settings_.rating + settings_.rating_sd * random_.normal();
+    return std::clamp(std::round(rated), asked.least.value_or(rated), asked.most.value_or(rated));
+  }
   double scale = 10;
   if (asked.standard && asked.modulus > 0 && estimates_.size() > 1)
     scale = asked.modulus / std::pow(std::abs(estimates_.front()), settings_.exponent);
@@ -353,11 +389,12 @@ BlockHypotheses block_hypotheses(const protocols::Protocol& protocol) {
 TaskParticipant::TaskParticipant(const SimulatedSettings& own, const ShapeHypotheses& hypotheses,
                                  const BlockHypotheses& of_blocks, devices::SimulatedStylus& stylus,
                                  const protocols::Protocol& protocol, std::uint64_t seed,
-                                 int number)
+                                 int number, JudgementOf planned)
     : protocol_(protocol),
       hand_(own, hypotheses, stylus, protocol, seed, number),
       of_blocks_(of_blocks),
       judgement_(protocol, {}),
+      planned_(std::move(planned)),
       percept_(protocol),
       seed_(seed),
       number_(number),
@@ -376,7 +413,8 @@ void TaskParticipant::begin_trial(const protocols::Trial& trial) {
   trial_ = trial;
   felt_ = 0;
   const auto& identified = of_blocks_[static_cast<std::size_t>(trial.task_block)];
-  identifier_ = identified ? &identifiers_.at(identified.get()) : nullptr;
+  identifier_ = identified && !planned_ ? &identifiers_.at(identified.get()) : nullptr;
+  if (planned_) judgement_.set(planned_now_ = planned_(number_, trial));
   judgement_.begin(trial, Random(seed_, {static_cast<std::uint64_t>(number_),
                                          static_cast<std::uint64_t>(trial.session),
                                          static_cast<std::uint64_t>(trial.trial), kJudgement}));
@@ -392,6 +430,7 @@ void TaskParticipant::begin_interval(const protocols::Trial& trial, const Interv
   // Answer within the time limit.
   constexpr double kShareOfTime = 0.8;
   look_ = std::min(kLook, kShareOfTime * block().interval_limit.value_or(block().time_out));
+  if (planned_) look_ = planned_now_.time.value_or(std::min(look_, kPlannedLook));
   protocols::Trial approach = trial;  // each interval has its own approach
   approach.trial = trial.trial * kMostIntervals + felt_++ % kMostIntervals;
   approach.renderer = view.shown->renderer;
@@ -429,6 +468,7 @@ std::optional<Answer> TaskParticipant::identify(const servo::Sample& sample) {
 std::optional<Answer> TaskParticipant::step(const servo::Sample& sample) {
   if (!view_.felt) return answer(sample.time_ns);
   if (identifier_ != nullptr) return identify(sample);
+  if (planned_) return step_as_planned(sample);
   hand_.step(sample);
   if (sample.phase != servo::Phase::feeling) return std::nullopt;
   percept_.add(sample);
@@ -442,6 +482,17 @@ std::optional<Answer> TaskParticipant::step(const servo::Sample& sample) {
   judgement_.feel(*view_.shown, {length ? length : percept_.stiffness(), length.has_value(),
                                  percept_.contact_ticks() > 0});
   if (limited_) return std::nullopt;  // the answer is given afterwards, without forces
+  return answer(sample.time_ns);
+}
+
+/// Keeps the hand's way, but judges the true level after the planned time.
+std::optional<Answer> TaskParticipant::step_as_planned(const servo::Sample& sample) {
+  hand_.step(sample);
+  if (sample.phase != servo::Phase::feeling || judged_ || sample.tick * period_ < look_)
+    return std::nullopt;
+  judged_ = true;
+  judgement_.feel(*view_.shown, {});
+  if (limited_) return std::nullopt;
   return answer(sample.time_ns);
 }
 

@@ -4,6 +4,7 @@
 // from contact if contact reveals them; the model is given the other levels.
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <memory>
 #include <optional>
@@ -91,7 +92,21 @@ struct JudgementSettings {
   double lapse = 0.02;
   double exponent = 0.8;   ///< rate
   double number_sd = 0.1;  ///< rate: sd of the log
+
+  // Of a person whom a plan describes; by default nothing is added.
+  /// compare, adjust: the comparison feels less by so many standard deviations of a difference, so
+  /// the PSE is higher.
+  double shift = 0;
+  double threshold_log_ratio = 0;       ///< compare, detect: the threshold is exp() times as high
+  std::optional<double> share_correct;  ///< identify: instead of a judgement
+  /// rate without exponent: steps from the middle of the scale, and of single ratings.
+  double rating = 0, rating_sd = 0;
+  std::optional<double> time;  ///< s, of the answer; none: as long as exploring takes
 };
+
+/// The judgement of participant 1, 2, ... in a trial, for a study that a plan describes. It judges
+/// the true levels, not what was felt.
+using JudgementOf = std::function<JudgementSettings(int, const protocols::Trial&)>;
 
 class TaskJudgement {
  public:
@@ -99,6 +114,7 @@ class TaskJudgement {
   TaskJudgement(const protocols::Protocol& protocol, const JudgementSettings& settings)
       : protocol_(protocol), settings_(settings) {}
 
+  void set(const JudgementSettings& settings) { settings_ = settings; }
   /// Before the first interval of a trial.
   void begin(const protocols::Trial& trial, const Random& random);
   /// The sensation of an interval.
@@ -123,7 +139,9 @@ class TaskJudgement {
   int detected();
   int adjusted();
   int identified();
+  int rated(std::uint64_t steps);
   double noise_of_difference(double reference) const;
+  double planned_noise(double noise, double reference) const;
 
   const protocols::Protocol& protocol_;
   JudgementSettings settings_;
@@ -149,10 +167,11 @@ BlockHypotheses block_hypotheses(const protocols::Protocol& protocol);
 class TaskParticipant final : public Respondent {
  public:
   /// As SimulatedParticipant. \param hypotheses  for exploration. \param of_blocks  for
-  /// identification; must outlive it, too
+  /// identification; must outlive it, too \param planned  empty: judges what it feels
   TaskParticipant(const SimulatedSettings& own, const ShapeHypotheses& hypotheses,
                   const BlockHypotheses& of_blocks, devices::SimulatedStylus& stylus,
-                  const protocols::Protocol& protocol, std::uint64_t seed, int number);
+                  const protocols::Protocol& protocol, std::uint64_t seed, int number,
+                  JudgementOf planned = {});
 
   void read(const std::string&) override {}
   void feedback(bool) override {}
@@ -167,6 +186,7 @@ class TaskParticipant final : public Respondent {
   Answer answer(std::int64_t time_ns);
   const protocols::TaskBlock& block() const;
   std::optional<Answer> identify(const servo::Sample& sample);
+  std::optional<Answer> step_as_planned(const servo::Sample& sample);
 
   const protocols::Protocol& protocol_;
   SimulatedParticipant hand_;
@@ -175,6 +195,8 @@ class TaskParticipant final : public Respondent {
   const BlockHypotheses& of_blocks_;
   SimulatedParticipant* identifier_ = nullptr;  ///< of this trial
   TaskJudgement judgement_;
+  JudgementOf planned_;
+  JudgementSettings planned_now_;  ///< of this trial
   LevelPercept percept_;
   std::uint64_t seed_;
   int number_;

@@ -329,7 +329,8 @@ void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& 
   std::unique_ptr<participants::Respondent> participant;
   if (!protocol.blocks.empty()) {
     participant = std::make_unique<participants::TaskParticipant>(
-        own, study.hypotheses, study.of_blocks, stylus, protocol, study.seed, session.participant);
+        own, study.hypotheses, study.of_blocks, stylus, protocol, study.seed, session.participant,
+        study.planned);
   } else {
     participant = std::make_unique<participants::SimulatedParticipant>(
         own, study.hypotheses, stylus, protocol, study.seed, session.participant);
@@ -366,8 +367,10 @@ data::RunInfo simulated_run(const protocols::Protocol& protocol,
 bool simulate_in_memory(
     const protocols::Protocol& protocol, const participants::SimulatedSettings& settings,
     int participants, std::uint64_t seed, const std::atomic<bool>& stop,
-    const std::function<void(int, const data::TrialRecord&, std::uint64_t)>& visit) {
-  const SimulatedStudy study(protocol, settings, seed);
+    const std::function<void(int, const data::TrialRecord&, std::uint64_t)>& visit,
+    const participants::JudgementOf& planned) {
+  SimulatedStudy study(protocol, settings, seed);
+  study.planned = planned;
   for (int number = 1; number <= participants; ++number) {
     for (int session = 1; session <= protocol.sessions.count; ++session) {
       VisitingLog log([&](const data::TrialRecord& record) {
@@ -438,7 +441,8 @@ StudyProgress simulate_study(const protocols::Protocol& protocol, data::Store& s
                              const participants::SimulatedSettings& settings, const StudyPlan& plan,
                              const std::atomic<bool>& stop,
                              const std::function<void(const StudyProgress&)>& report) {
-  const SimulatedStudy study(protocol, settings, plan.seed);
+  SimulatedStudy study(protocol, settings, plan.seed);
+  study.planned = plan.planned;
   std::atomic<bool> failed{false};  // a worker or the store threw
   const auto halting = [&] { return stop || failed; };
 

@@ -39,6 +39,7 @@ struct SimulatedStudy {
   participants::ShapeHypotheses hypotheses;
   participants::BlockHypotheses of_blocks;  ///< version 2
   std::uint64_t seed;  ///< of the participants; the schedule has the protocol's own
+  participants::JudgementOf planned = {};  ///< version 2: as a plan says; empty: from what is felt
 };
 
 struct SimulatedSession {
@@ -65,7 +66,8 @@ data::RunInfo simulated_run(const protocols::Protocol& protocol,
 bool simulate_in_memory(
     const protocols::Protocol& protocol, const participants::SimulatedSettings& settings,
     int participants, std::uint64_t seed, const std::atomic<bool>& stop,
-    const std::function<void(int, const data::TrialRecord&, std::uint64_t)>& visit);
+    const std::function<void(int, const data::TrialRecord&, std::uint64_t)>& visit,
+    const participants::JudgementOf& planned = {});
 
 struct StudyPlan {
   int participants = 7;         ///< number of the last one
@@ -75,6 +77,7 @@ struct StudyPlan {
   std::string event = {};       ///< for each session's record; empty: none
   std::string advisor = {};     ///< socket of a program that proposes levels; empty: none
   double advisor_time_out = 1;  ///< s
+  participants::JudgementOf planned = {};  ///< as of SimulatedStudy
 };
 
 struct StudyProgress {
