@@ -254,6 +254,15 @@ void drop_missing_answers(std::vector<TaskTrial>& trials) {
   }
 }
 
+/// The procedures of a protocol, and its title if the trials are of it.
+void put_protocol(const std::string& sha256, const std::string& text, const std::string& path,
+                  TaskTable& table) {
+  table.procedures[sha256] = protocols::procedures_of_blocks(text, path);
+  const bool used = std::ranges::any_of(table.protocols,
+                                        [&](const auto& known) { return known.second == sha256; });
+  if (used && table.title.empty()) table.title = data::read_stored_protocol(text).title;
+}
+
 void warn_of_alike_names(TaskTable& table) {
   Interner participants, renderers, shapes;
   for (const TaskTrial& trial : table.trials) {
@@ -268,7 +277,8 @@ void warn_of_alike_names(TaskTable& table) {
 
 }  // namespace
 
-TaskTable read_task_trials_csv(const std::string& path, const std::string& protocol) {
+TaskTable read_task_trials_csv(const std::string& path, const std::string& protocol,
+                               const std::vector<ProtocolText>& protocols) {
   TaskTable table;
   table.source = table.provenance.source = path;
   std::vector<protocols::Fault> faults;
@@ -304,8 +314,10 @@ TaskTable read_task_trials_csv(const std::string& path, const std::string& proto
                             std::to_string(reader.fields().size())});
       continue;
     }
-    const std::pair named(std::string(row.value("protocol_name")),
-                          std::string(row.value("protocol_sha256")));
+    std::pair named(std::string(row.value("protocol_name")),
+                    std::string(row.value("protocol_sha256")));
+    const auto stated = std::ranges::find(protocols, named.second, &ProtocolText::sha256);
+    if (stated != protocols.end()) named.first = stated->name;
     if (!is_protocol(protocol, named.first, named.second)) continue;
     const bool simulated = row.yes("simulated");
     table.simulated |= simulated;
@@ -316,6 +328,7 @@ TaskTable read_task_trials_csv(const std::string& path, const std::string& proto
     table.trials.push_back(read_trial(row));
     TaskTrial& trial = table.trials.back();
     trial.simulated = simulated;
+    if (!protocols.empty()) trial.participant_number = row.whole("participant_number");
     note_shown(trial.protocol_sha256, table.provenance.protocol_sha256);
     note_shown(row.value("program_version"), table.provenance.program_versions);
     if (!row.value("torque_driven").empty()) torque.add(trial.renderer, row.yes("torque_driven"));
@@ -335,6 +348,7 @@ TaskTable read_task_trials_csv(const std::string& path, const std::string& proto
                       "expected at least one trial that is not practice" +
                           (protocol.empty() ? "" : " of the protocol " + protocol)});
   if (!faults.empty()) throw protocols::InputError(std::move(faults));
+  for (const ProtocolText& one : protocols) put_protocol(one.sha256, one.text, path, table);
   if (numbered) order_trials(table.trials);
   drop_missing_answers(table.trials);
   warn_of_alike_names(table);
@@ -427,10 +441,7 @@ TaskTable read_task_trials_store(const std::string& path, const std::string& pro
   });
   for (const data::ProtocolInfo& one : store.protocols()) {
     if (is_protocol(protocol, one.name, one.sha256))
-      table.procedures[one.sha256] = protocols::procedures_of_blocks(one.text, path);
-    const bool used = std::ranges::any_of(
-        table.protocols, [&](const auto& known) { return known.second == one.sha256; });
-    if (used && table.title.empty()) table.title = data::read_stored_protocol(one.text).title;
+      put_protocol(one.sha256, one.text, path, table);
   }
   table.people = data::participant_columns(store);
   std::set<std::string> shown;

@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "analysis/input/study_record.h"
 #include "analysis/input/trials.h"
 #include "data/record.h"
 #include "data/store/participant_columns.h"
@@ -41,7 +42,8 @@ struct TaskTable {
   std::vector<data::ParticipantColumn> people;
   /// Their protocols: name and SHA-256, each once.
   std::vector<std::pair<std::string, std::string>> protocols;
-  /// The procedures, by SHA-256 of the protocol and name of the block; from databases only.
+  /// The procedures, by SHA-256 of the protocol and name of the block; of a table only if its
+  /// protocols were given.
   std::map<std::string, std::map<std::string, protocols::BlockProcedures>> procedures;
 };
 
@@ -53,7 +55,10 @@ bool has_task_trials(const std::string& path, const std::string& protocol = "");
 /// standard_level, success, number, confidence, ... are optional. \param protocol  name of the
 /// protocol to read, or the first six or more digits of its SHA-256; "": all.
 /// \throws protocols::InputError with every fault.
-TaskTable read_task_trials_csv(const std::string& path, const std::string& protocol = "");
+/// \param protocols  of the study, with their texts: their names and procedures belong to the
+/// trials, as in a database
+TaskTable read_task_trials_csv(const std::string& path, const std::string& protocol = "",
+                               const std::vector<ProtocolText>& protocols = {});
 
 /// Converts trials of identification without catch trials and levels to those of version 1;
 /// nullopt: there are none, or the source lacks their times or numbers.

@@ -40,7 +40,9 @@ std::string report_html(const Analysis& analysis, const StudyRecord& record);
 /// The analysis of the tasks of a study of version 2, for a terminal.
 std::string task_report_text(const TaskAnalysis& analysis);
 /// The same as an HTML page with the figures.
-std::string task_report_html(const TaskAnalysis& analysis, const std::string& program_version);
+/// \param record  whether the study was checked against its registration
+std::string task_report_html(const TaskAnalysis& analysis, const std::string& program_version,
+                             const StudyRecord& record = {});
 /// Every number, 17 significant digits. An infinite end of an interval is null.
 std::string task_report_json(const TaskAnalysis& analysis, const std::string& program_version);
 

@@ -124,8 +124,9 @@ Table people_table(const TaskTable& source, const std::string& label) {
 /// Sections of a page of tasks: results over participants, figures, each task's numbers.
 class TaskPage {
  public:
-  explicit TaskPage(const TaskAnalysis& analysis)
+  TaskPage(const TaskAnalysis& analysis, const StudyRecord& record)
       : analysis_(analysis),
+        record_(record),
         label_(analysis.table.simulated ? "SIMULATED PARTICIPANTS" : ""),
         figures_(task_figures(analysis)),
         page_(conclusion(analysis), label_) {}
@@ -138,6 +139,7 @@ class TaskPage {
     put_cells();
     put_figures(false);
     put_identification();
+    put_check();
     return page_.html("Analysed with palpate " + program_version + ".");
   }
 
@@ -156,6 +158,15 @@ class TaskPage {
     page_.below_title() += "<div class=\"warnings\" aria-label=\"Warnings\">\n";
     put_list(page_.below_title(), source.warnings);
     page_.below_title() += "</div>\n";
+  }
+
+  void put_check() {
+    if (record_.checked.empty()) return;
+    page_.begin_section("registration", "Check against the registration", "Registration");
+    page_.body() += "<p>" + escaped_sentence(printable(record_.checked, 4000)) +
+                    "</p>\n<p><a href=\"" + escaped(record_.check_page) +
+                    "\">The check, point by point</a></p>\n";
+    page_.end_section();
   }
 
   void put_people() {
@@ -212,6 +223,7 @@ class TaskPage {
   }
 
   const TaskAnalysis& analysis_;
+  const StudyRecord& record_;
   std::string label_;
   std::vector<Figure> figures_;
   HtmlPage page_;
@@ -219,8 +231,9 @@ class TaskPage {
 
 }  // namespace
 
-std::string task_report_html(const TaskAnalysis& analysis, const std::string& program_version) {
-  return TaskPage(analysis).html(program_version);
+std::string task_report_html(const TaskAnalysis& analysis, const std::string& program_version,
+                             const StudyRecord& record) {
+  return TaskPage(analysis, record).html(program_version);
 }
 
 namespace {
@@ -629,6 +642,85 @@ TaskJson least_bound(const TaskGroupComparison& one) {
   return std::max(size(*one.low90), size(*one.high90));
 }
 
+/// A paired comparison by its names.
+void put_comparison(const TaskComparison& one, const ConditionDifference& difference,
+                    TaskJson& place, TaskJson& bound) {
+  const auto back = [&](double value) { return one.logarithms ? std::exp(value) : value; };
+  const PairedEvidence evidence = evidence_of(difference.mean, difference.t_test);
+  const auto& ends = difference.t_test.log_ratio_ci95;
+  const auto end = [&](const std::optional<Interval>& of, bool low) {
+    return of ? finite(back(low ? of->low : of->high)) : TaskJson(nullptr);
+  };
+  place.update({{one.logarithms ? "ratio" : "difference", finite(back(difference.mean))},
+                {"ci95_low", end(ends, true)},
+                {"ci95_high", end(ends, false)},
+                {"ci90_low", end(evidence.ci90, true)},
+                {"ci90_high", end(evidence.ci90, false)},
+                {"t", maybe(difference.t_test.t)},
+                {"p", maybe(difference.t_test.p)},
+                {"p_holm", maybe(difference.t_test.p_holm)},
+                {"wilcoxon_p", maybe(difference.wilcoxon.p)},
+                {"bf10", maybe(evidence.bayes_factor)},
+                {"n", difference.n_pairs}});
+  bound["least_bound"] = maybe(evidence.least_bound);
+}
+
+/// The name of a compared condition: BLOCK, of several stimuli in a block BLOCK.STIMULUS.
+std::string short_condition(const TaskAnalysis& analysis, const TaskComparison& one,
+                            const std::string& condition) {
+  if (!one.block_name.empty()) return condition;
+  for (const TaskCell& cell : analysis.cells) {
+    if (cell.task != one.task ||
+        cell.block_name + (cell.shape.empty() ? "" : ", " + cell.shape) != condition)
+      continue;
+    const bool several = std::ranges::any_of(analysis.cells, [&](const TaskCell& other) {
+      return other.task == cell.task && other.block_name == cell.block_name &&
+             other.shape != cell.shape;
+    });
+    return several ? cell.block_name + "." + cell.shape : cell.block_name;
+  }
+  return condition;
+}
+
+/// Comparisons of blocks and stimuli: between.MEASURE.REFERENCE.COMPARED, where a condition is
+/// BLOCK or BLOCK.STIMULUS; of ratings between.rating.BLOCK.STIMULUS.STIMULUS. Of several renderers
+/// the renderer follows.
+void put_conditions(const TaskAnalysis& analysis, TaskJson& out) {
+  std::set<std::string> renderers;
+  for (const TaskCell& cell : analysis.cells) renderers.insert(cell.renderer);
+  for (const TaskComparison& one : analysis.conditions) {
+    for (const ConditionDifference& difference : one.comparison.differences) {
+      const auto place = [&](TaskJson& root) -> TaskJson& {
+        TaskJson* at = &root["between"][one.measure];
+        if (!one.block_name.empty()) at = &(*at)[one.block_name];
+        at = &(*at)[short_condition(analysis, one, one.conditions.front())];
+        at = &(*at)[short_condition(analysis, one, one.conditions[difference.condition])];
+        return renderers.size() > 1 ? (*at)[one.renderer] : *at;
+      };
+      put_comparison(one, difference, place(out), place(out["equivalence"]));
+    }
+  }
+}
+
+/// The group's values without a model: means of exponents, ratings and settings.
+void put_means(const TaskAnalysis& analysis, TaskJson& out) {
+  for (const TaskGroup& group : analysis.groups) {
+    for (const GroupMean& one : group.renderers) {
+      if (one.of_model || !one.mean) continue;
+      const auto end = [&](bool low) {
+        return one.ci95 ? finite(low ? one.ci95->low : one.ci95->high) : TaskJson(nullptr);
+      };
+      TaskJson& place = named_place(out, analysis, group.measure, group.task, group.block_name,
+                                    group.shape)[one.renderer];
+      if (place.is_null())
+        place = {{"estimate", finite(*one.mean)},
+                 {"ci95_low", end(true)},
+                 {"ci95_high", end(false)},
+                 {"n", one.participants.size()}};
+    }
+  }
+}
+
 /// Results by name, for hypotheses: objects, as elements of lists have no names. Of more than two
 /// renderers the compared one is a part of the name.
 TaskJson named_json(const TaskAnalysis& analysis) {
@@ -666,32 +758,17 @@ TaskJson named_json(const TaskAnalysis& analysis) {
   for (const TaskComparison& one : analysis.renderers) {
     if (has_model(analysis, one)) continue;
     for (const ConditionDifference& difference : one.comparison.differences) {
-      const bool several = one.conditions.size() > 2;
       const std::string& compared = one.conditions[difference.condition];
-      const auto back = [&](double value) { return one.logarithms ? std::exp(value) : value; };
-      const PairedEvidence evidence = evidence_of(difference.mean, difference.t_test);
-      const auto& ends = difference.t_test.log_ratio_ci95;
-      const auto end = [&](const std::optional<Interval>& of, bool low) {
-        return of ? finite(back(low ? of->low : of->high)) : TaskJson(nullptr);
+      const auto place = [&](TaskJson& root) -> TaskJson& {
+        TaskJson& all =
+            named_place(root, analysis, one.measure, one.task, one.block_name, one.shape);
+        return one.conditions.size() > 2 ? all[compared] : all;
       };
-      TaskJson& place =
-          named_place(out, analysis, one.measure, one.task, one.block_name, one.shape);
-      (several ? place[compared] : place)
-          .update({{one.logarithms ? "ratio" : "difference", finite(back(difference.mean))},
-                   {"ci95_low", end(ends, true)},
-                   {"ci95_high", end(ends, false)},
-                   {"ci90_low", end(evidence.ci90, true)},
-                   {"ci90_high", end(evidence.ci90, false)},
-                   {"t", maybe(difference.t_test.t)},
-                   {"p", maybe(difference.t_test.p)},
-                   {"p_holm", maybe(difference.t_test.p_holm)},
-                   {"bf10", maybe(evidence.bayes_factor)},
-                   {"n", difference.n_pairs}});
-      TaskJson& bound = named_place(out["equivalence"], analysis, one.measure, one.task,
-                                    one.block_name, one.shape);
-      (several ? bound[compared] : bound)["least_bound"] = maybe(evidence.least_bound);
+      put_comparison(one, difference, place(out), place(out["equivalence"]));
     }
   }
+  put_conditions(analysis, out);
+  put_means(analysis, out);
   return out;
 }
 
