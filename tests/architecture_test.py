@@ -107,7 +107,7 @@ PUBLIC = {
                            "sweep_analysis task_analysis threshold_plan",
     "analysis/movement": "comparison measures pictures",
     "analysis/figures": "panel_drawing figures svg",
-    "analysis/report": "coverage_report html_page hypotheses plan_report report tables",
+    "analysis/report": "coverage_report html_page hypotheses plan_record plan_report report tables",
     "runner": "",
     "runner/servo": "device force_limiter passivity realtime ring sample servo servo_thread "
                     "shared_value tick_source touched_places triple_buffer",

@@ -91,7 +91,7 @@ PlannedOutcome outcome_of_functions(const ThresholdStudy& study, const GroupStud
   return out;
 }
 
-// Shares and ratings: the t-test of participants' differences.
+// Shares, ratings and exponents: the t-test of participants' differences.
 
 PlannedOutcome outcome_of_differences(const ThresholdStudy& study,
                                       const std::vector<double>& differences) {
@@ -117,19 +117,6 @@ double expected_share(double middle, double sd) {
     weights += weight;
   }
   return sum / weights;
-}
-
-/// Log odds of the second condition with which the expected share differs by the effect.
-double shifted_log_odds(const ThresholdStudy& study) {
-  const double first = logit(study.accuracy);
-  const double sd = std::hypot(study.participant_sd, study.effect_sd / 2);
-  const double want = expected_share(first, sd) + study.effect;
-  double low = -20, high = 20;
-  for (int i = 0; i < 60; ++i) {
-    const double middle = 0.5 * (low + high);
-    (expected_share(middle, sd) < want ? low : high) = middle;
-  }
-  return 0.5 * (low + high) - first;
 }
 
 double share_difference(const ThresholdStudy& study, double shift, std::size_t trials,
@@ -164,20 +151,47 @@ double rating_difference(const ThresholdStudy& study, std::size_t trials, Random
   return difference;
 }
 
+/// Difference of log exponents as lines are fitted to the participant's numbers.
+double exponent_difference(const ThresholdStudy& study, std::size_t trials, Random& random) {
+  const double each = std::max(1.0, std::floor(static_cast<double>(trials) / kPlanLevels));
+  double squares = 0;  // of the log levels
+  for (int i = 0; i < kPlanLevels; ++i) {
+    const double place = (i / (kPlanLevels - 1.0) - 0.5) * std::log(10.0);
+    squares += place * place;
+  }
+  const double slope_sd = study.number_sd / std::sqrt(each * squares);
+  const double level = std::log(kTypicalExponent) + study.participant_sd * random.normal();
+  const double own = study.effect + study.effect_sd * random.normal();
+  double difference = 0;
+  for (const bool second : {false, true}) {
+    const double slope =
+        std::exp(level + (second ? own / 2 : -own / 2)) + slope_sd * random.normal();
+    difference += (second ? 1 : -1) * std::log(std::max(slope, 1e-3));
+  }
+  return difference;
+}
+
+bool is_of_differences(PlannedMeasure measure) {
+  return measure == PlannedMeasure::accuracy || measure == PlannedMeasure::rating ||
+         measure == PlannedMeasure::exponent;
+}
+
 /// Outcomes of a study for each number of participants.
 std::vector<PlannedOutcome> outcomes_of(const ThresholdStudy& study, std::size_t trials,
                                         const std::vector<std::size_t>& participants,
                                         std::uint64_t seed, std::size_t number) {
   std::vector<PlannedOutcome> out;
   const std::size_t most = participants.back();
-  if (study.measure == PlannedMeasure::accuracy || study.measure == PlannedMeasure::rating) {
+  if (is_of_differences(study.measure)) {
     const bool of_shares = study.measure == PlannedMeasure::accuracy;
-    const double shift = of_shares ? shifted_log_odds(study) : 0;
+    const double shift = of_shares ? log_odds_effect(study) : 0;
     std::vector<double> differences;
     for (std::size_t i = 0; i < most; ++i) {
       Random random(seed, {0x7a, trials, number, i});
       differences.push_back(of_shares ? share_difference(study, shift, trials, random)
-                                      : rating_difference(study, trials, random));
+                            : study.measure == PlannedMeasure::rating
+                                ? rating_difference(study, trials, random)
+                                : exponent_difference(study, trials, random));
     }
     for (const std::size_t n : participants)
       out.push_back(outcome_of_differences(
@@ -222,6 +236,18 @@ ThresholdPower power_of(const ThresholdStudy& study, std::size_t trials, std::si
 }
 
 }  // namespace
+
+double log_odds_effect(const ThresholdStudy& study) {
+  const double first = logit(study.accuracy);
+  const double sd = std::hypot(study.participant_sd, study.effect_sd / 2);
+  const double want = expected_share(first, sd) + study.effect;
+  double low = -20, high = 20;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (expected_share(middle, sd) < want ? low : high) = middle;
+  }
+  return 0.5 * (low + high) - first;
+}
 
 ThresholdPlan plan_thresholds(const ThresholdStudy& study, ThresholdPlanSettings settings) {
   ThresholdPlan plan{study, std::move(settings), {}};

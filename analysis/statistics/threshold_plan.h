@@ -1,7 +1,7 @@
 #pragma once
 // Numbers of participants and trials needed to detect a difference between two renderers or
-// conditions in JNDs, PSEs, thresholds, accuracy or ratings, or to show equivalence, from simulated
-// studies analysed as in `analyze`.
+// conditions in JNDs, PSEs, thresholds, accuracy, ratings or exponents, or to show equivalence,
+// from simulated studies analysed as in `analyze`.
 
 #include <cstddef>
 #include <cstdint>
@@ -13,30 +13,36 @@
 
 namespace palpate::analysis {
 
-enum class PlannedMeasure { jnd, pse, threshold, accuracy, rating };
+enum class PlannedMeasure { jnd, pse, threshold, accuracy, rating, exponent };
 
 /// The same participants under both conditions. JND, PSE: two intervals, constant stimuli, seven
 /// levels evenly over `reach` JNDs on either side of the standard. Threshold: forced choice of two,
 /// seven levels by equal ratios over `reach` widths (of the log threshold) on either side.
-/// Accuracy: four shapes of equal difficulty. Ratings: steps 1 to 7.
+/// Accuracy: four shapes of equal difficulty. Ratings: steps 1 to 7. Exponents: magnitude
+/// estimation of seven levels by equal ratios over a decade.
 struct ThresholdStudy {
   PlannedMeasure measure = PlannedMeasure::jnd;
-  /// Second minus first condition: of log JNDs and log thresholds, of PSEs in JNDs, of shares
-  /// correct, of ratings in steps.
+  /// Second minus first condition: of log JNDs, thresholds and exponents, of PSEs in JNDs, of
+  /// shares correct, of ratings in steps.
   double effect = -0.22314355131420976;
-  double effect_sd = 0.2;       ///< of participants' differences, likewise; accuracy: of log odds
-  double participant_sd = 0.3;  ///< of log JND or threshold; accuracy: of log odds; ratings: steps
+  double effect_sd = 0.2;  ///< of participants' differences, likewise; accuracy: of log odds
+  /// Of log JND, threshold or exponent; accuracy: of log odds; ratings: steps.
+  double participant_sd = 0.3;
   double weber_fraction = 0.1;  ///< JND / standard with the first condition, median participant
   double pse_sd = 0.5;          ///< of the PSE, in JNDs
   double width = 0.35;          ///< threshold: of the function, in logs of the level
   double accuracy = 0.8;        ///< share correct with the first condition, median participant
   double rating_sd = 1;         ///< of single ratings, steps
+  double number_sd = 0.2;       ///< exponent: of single estimates, natural logs
   double lapse = 0.02;          ///< at either end
   double reach = 2.5;
   double alpha = 0.05;  ///< two-sided
   /// On the scale of `effect`: equivalence is to be shown; none: a difference.
   std::optional<double> bound;
 };
+
+/// Of magnitude estimation with the first condition, median participant.
+inline constexpr double kTypicalExponent = 0.8;
 
 struct ThresholdPower {
   std::size_t trials = 0;  ///< with each condition
@@ -63,6 +69,10 @@ struct ThresholdPlan {
   ThresholdPlanSettings settings;
   std::vector<ThresholdPower> powers;  ///< by trials, then participants
 };
+
+/// Of accuracy: log odds of the second minus the first condition with which the expected shares
+/// differ by the effect.
+double log_odds_effect(const ThresholdStudy& study);
 
 /// A study of fewer participants is the first of a study of more. The result does not depend on the
 /// number of jobs.

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <iostream>
+#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -16,10 +17,16 @@
 #include "analysis/report/report.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/task_analysis.h"
+#include "data/base/checksum.h"
+#include "data/base/json_text.h"
 #include "data/base/text.h"
+#include "data/stored_protocol.h"
+#include "protocols/json_document.h"
+#include "runner/commands/bundle/contents.h"
 #include "runner/commands/movement/movement_study.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
+#include "runner/commands/shared/study_analysis.h"
 #include "runner/commands/shared/study_trials.h"
 #include "runner/commands/sweep/planned.h"
 
@@ -34,6 +41,8 @@ void check(const boost::program_options::variables_map& values,
     throw UsageError("expected one of --db FILE, --csv FILE and --sweep FILE\nUsage: " + usage +
                      "\nMore: add --help");
   }
+  if (values.count("design") && !values.count("csv"))
+    throw UsageError("--design: is of a table of tasks; give --csv FILE");
   if (values.count("pattern") && !values.count("sweep"))
     throw UsageError("--pattern: is looked for in a sweep; give --sweep FILE");
   if (values.count("sweep") && !values["too-fast-s"].defaulted())
@@ -79,21 +88,31 @@ analysis::FunctionSettings function_settings(const boost::program_options::varia
   return settings;
 }
 
+/// The protocol of a file, or those of a bundle's record. \throws UsageError, InputError
+std::vector<analysis::ProtocolText> protocols_in(const std::string& file) {
+  if (file.empty()) return {};
+  const std::string text = protocols::read_text_file(file);
+  const nlohmann::json json = json_or_discarded(text);
+  if (json.is_object() && json.contains("protocols")) return parse_record(text, file).protocols;
+  const data::StoredProtocol stored = data::read_stored_protocol(text);
+  if (!json.is_object() || !json.contains("blocks"))
+    throw UsageError(printable(file) +
+                     ": expected a protocol with blocks, or record.json of a bundle");
+  return {{json.value("name", ""), checksum_hex(text), text, stored.title, stored.seed}};
+}
+
 /// Analyses a study of version 2, or its export.
 void analyze_tasks_of(const std::string& database, const std::string& csv,
-                      const std::string& protocol, const analysis::AnalysisSettings& settings,
+                      const std::string& protocol, const std::string& design,
+                      const analysis::AnalysisSettings& settings,
                       const analysis::FunctionSettings& functions, Outputs& outputs) {
-  const analysis::TaskAnalysis found = analysis::analyze_tasks(
-      read_study_tasks(database, csv, protocol), functions, settings, PALPATE_VERSION);
+  const analysis::TaskAnalysis found =
+      analysis::analyze_tasks(read_study_tasks(database, csv, protocol, protocols_in(design)),
+                              functions, settings, PALPATE_VERSION);
   if (outputs.wanted("json")) outputs.put("json", task_report_json(found, PALPATE_VERSION));
   if (outputs.wanted("report")) outputs.put("report", task_report_html(found, PALPATE_VERSION));
   if (outputs.wanted("figures")) {
-    std::vector<analysis::Figure> figures = analysis::task_figures(found);
-    if (found.identification) {
-      for (analysis::Figure& figure : analysis::figures_of(*found.identification, {}))
-        figures.push_back(std::move(figure));
-    }
-    for (const analysis::Figure& figure : figures)
+    for (const analysis::Figure& figure : figures_of(StudyAnalysis(found), {}))
       outputs.put_into_folder(figure.id + ".svg",
                               analysis::figure_svg(figure, analysis::light_palette()));
   }
@@ -189,7 +208,8 @@ int analyze_command(const std::vector<std::string>& args) {
       "  palpate analyze --sweep people.sweep --pattern 'cone > 5 && cone > 2 * abs(sphere)'\n"
       "      (names: shapes, for their gains in percent, and columns of the CSV, such as delay or\n"
       "      time_ray_cone; + - * /, < <= > >= == !=, && || !, min, max, abs, parentheses)";
-  std::string database, csv, sweep, pattern, protocol, json, report, figures, function, scale;
+  std::string database, csv, sweep, pattern, protocol, design, json, report, figures, function,
+      scale;
   analysis::AnalysisSettings settings;
   auto add = line.options.add_options();
   namespace po = boost::program_options;
@@ -200,6 +220,10 @@ int analyze_command(const std::vector<std::string>& args) {
       "of a sweep: what to look for at each point; default: the paper's pattern");
   add("protocol", po::value(&protocol)->value_name("NAME"),
       "which of several protocols: its name, or the beginning of its SHA-256");
+  add("design", po::value(&design)->value_name("FILE"),
+      "of a table of tasks: its protocol, or a bundle's record.json; so names, scales and "
+      "procedures "
+      "are those of a database");
   add("json", po::value(&json)->value_name("FILE"), "write every number as JSON");
   add("report", po::value(&report)->value_name("FILE.html"), "write a report as an HTML page");
   add("figures", po::value(&figures)->value_name("DIR"),
@@ -245,8 +269,8 @@ int analyze_command(const std::vector<std::string>& args) {
     analyze_movement_of(movement, outputs);
     return 0;
   }
-  if (is_of_tasks(database, csv, protocol)) {
-    analyze_tasks_of(database, csv, protocol, settings, functions, outputs);
+  if (!design.empty() || is_of_tasks(database, csv, protocol)) {
+    analyze_tasks_of(database, csv, protocol, design, settings, functions, outputs);
     return 0;
   }
 

@@ -10,6 +10,7 @@
 #include "protocols/parse.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/outputs.h"
+#include "runner/commands/shared/study_order.h"
 #include "runner/commands/shared/task_words.h"
 
 namespace palpate::runner::commands {
@@ -74,7 +75,8 @@ void print_table(const protocols::Protocol& protocol, const std::vector<protocol
 int schedule_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage =
-      "palpate schedule PROTOCOL.json (--participant N | --recover N) [--format table|csv|json]";
+      "palpate schedule PROTOCOL.json (--participant N | --recover N) [--format "
+      "table|csv|json|order]";
   line.summary =
       "Prints the trials that a participant will get, in order, without running them.\n"
       "If answers choose the levels: prints the rule and an example.";
@@ -86,7 +88,7 @@ int schedule_command(const std::vector<std::string>& args) {
   line.options.add_options()("participant", po::value<int>()->value_name("N"),
                              "participant number: 1, 2, ...")(
       "format", po::value<std::string>()->default_value("table")->value_name("FORMAT"),
-      "table, csv or json")(
+      "table, csv, json, or order: the lines of which a registration holds the checksum")(
       "recover", po::value<int>()->value_name("N"),
       "instead: bias and spread of the thresholds that its adaptive procedures find, over N "
       "simulated participants whose threshold is known")(
@@ -94,13 +96,14 @@ int schedule_command(const std::vector<std::string>& args) {
   const auto values = line.parse(args);
   if (!values) return 0;
   const auto format = (*values)["format"].as<std::string>();
-  if (format != "table" && format != "csv" && format != "json") {
-    throw UsageError("--format: expected table, csv or json, found '" + format + "'");
+  if (format != "table" && format != "csv" && format != "json" && format != "order") {
+    throw UsageError("--format: expected table, csv, json or order, found '" + format + "'");
   }
 
   const protocols::Protocol protocol =
       protocols::parse_protocol((*values)["PROTOCOL.json"].as<std::string>());
   if (values->count("recover")) {
+    if (format == "order") throw UsageError("--recover: is no order; expected table, csv or json");
     const int count = (*values)["recover"].as<int>();
     if (count < 2 || count > 100000) throw UsageError("--recover: must be 2 to 100000");
     std::cout << recovery_text(protocol, count, (*values)["seed"].as<std::uint64_t>(), format);
@@ -110,6 +113,10 @@ int schedule_command(const std::vector<std::string>& args) {
     throw UsageError("expected --participant N\nUsage: " + line.usage + "\nMore: add --help");
   const int participant = (*values)["participant"].as<int>();
   check_participant_number(participant);
+  if (format == "order") {
+    std::cout << fixed_order(protocol, participant);
+    return 0;
+  }
   if (protocol.version == 2) {
     std::cout << task_schedule_text(protocol, participant, format);
     return 0;

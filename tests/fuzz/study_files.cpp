@@ -7,7 +7,7 @@
 #include <string>
 
 #include "analysis/report/hypotheses.h"
-#include "analysis/report/plan_report.h"
+#include "analysis/report/plan_record.h"
 #include "protocols/parse.h"
 #include "protocols/tasks/texts.h"
 #include "runner/commands/bundle/contents.h"

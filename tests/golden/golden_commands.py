@@ -24,6 +24,14 @@ ABOUT = File("about.json", '{"version": 1, "authors": [{"name": "Ada Example"}],
 HYPOTHESES = File("hypotheses.json", json.dumps([
     {"id": "H1", "text": "Cones are found faster with the ray.", "corroborated": "paired.cone.p_holm < alpha && paired.cone.reduction > 0",
      "refuted": "paired.cone.ci95_high < 5"}]))
+RATING = File("hard.json", json.dumps({
+    "version": 2, "name": "hard", "renderers": ["point", "ray"], "orientation": "fixed", "seed": 4,
+    "stimuli": [{"name": "ball", "shape": "sphere", "radius_m": 0.03, "stiffness_n_per_m": 300}],
+    "blocks": [{"name": "hardness", "task": "rate", "question": "How hard was it?", "stimuli": ["ball"], "repetitions": 4,
+                "scale": [{"label": label} for label in ("soft", "rather soft", "medium", "rather hard", "hard")]}]}))
+HARDER = File("harder.json", json.dumps([
+    {"id": "H1", "text": "It feels harder with the ray.", "corroborated": "rating.hardness.p < alpha && rating.hardness.difference > 0",
+     "refuted": "rating.hardness.ci95_high < 0.5"}]))
 SETTINGS = File("settings.json", '{"motor": {"slide_speed_m_per_s": 0.04}}')
 TETRAHEDRON = [((0, 0, 0), (0, 0.03, 0), (0.03, 0, 0)), ((0, 0, 0), (0.03, 0, 0), (0, 0, 0.03)),
                ((0, 0, 0), (0, 0, 0.03), (0, 0.03, 0)), ((0.03, 0, 0), (0, 0.03, 0), (0, 0, 0.03))]
@@ -210,6 +218,16 @@ def registration_lines():
                   "bundle --db study.db --registration registration --about about.json --out study --force", "bundle --verify study"),
            Shell("its digest", "palpate bundle --verify study --digest $(sha256sum < registration/SHA256SUMS | cut -c-64)"),
            Shell("other data", "sed -i 2d study/data/trials.csv; palpate bundle --verify study", status=1)]
+    yield [RATING, HARDER, ABOUT,
+           *steps("plan --exponent-effect 30 --trials 28 --participants 8-9 --studies 100 --json exponent.json",
+                  "plan --rating-effect 1.5 --trials 4 --participants 6-8 --studies 100 --json plan.json",
+                  "register hard.json --plan plan.json --hypotheses harder.json --participants 6 --out registration --studies 20",
+                  "schedule hard.json --participant 2 --format order", "schedule protocols/quick.json --participant 1 --format order",
+                  "schedule protocols/stiffness-2afc.json --participant 1 --format order",
+                  "simulate hard.json --db study.db --participants 6", "check registration --db study.db --json check.json",
+                  "bundle --db study.db --registration registration --about about.json --out study", "bundle --verify study",
+                  "analyze --csv study/data/trials.csv --design hard.json --json analysis.json"),
+           refused("register hard.json --plan exponent.json --hypotheses harder.json --out other", 2)]
 
 
 def protocol_lines():

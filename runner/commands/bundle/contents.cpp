@@ -5,14 +5,15 @@
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <set>
 #include <utility>
 
 #include "analysis/figures/figures.h"
 #include "analysis/figures/svg.h"
 #include "analysis/input/csv_reader.h"
+#include "analysis/input/task_trials.h"
 #include "analysis/input/trials.h"
-#include "analysis/report/report.h"
 #include "analysis/text.h"
 #include "data/base/checksum.h"
 #include "data/base/markdown.h"
@@ -128,6 +129,7 @@ class TrialFields {
            std::string("a whole number in ") + name + ", found '" + printable(field, 60) + "'");
     return value;
   }
+  bool has(const char* name) const { return table_.column(name) < table_.header.size(); }
   bool flag(std::size_t row, const char* name) const { return text(row, name) == "1"; }
 
  private:
@@ -147,6 +149,32 @@ void put_servo(const TextTable& table, const TrialFields& of, analysis::StudyRec
                          of.flag(i, "started_inside"), of.number(i, "max_force")},
                         record.servo);
   }
+}
+
+std::optional<double> level_of(const TrialFields& of, std::size_t row) {
+  if (of.text(row, "level").empty()) return std::nullopt;
+  return of.number(row, "level");
+}
+
+ShownTrial shown_trial(const TrialFields& of, std::size_t row, int session) {
+  ShownTrial out;
+  out.row = {session,
+             of.text(row, "renderer"),
+             of.text(row, "shape"),
+             {of.number(row, "orientation_w"), of.number(row, "orientation_x"),
+              of.number(row, "orientation_y"), of.number(row, "orientation_z")}};
+  out.practice = of.flag(row, "practice");
+  if (!of.has("task") || of.text(row, "block_name").empty()) return out;
+  const std::string& comparison = of.text(row, "comparison_interval");
+  out.row.task = {static_cast<int>(of.count(row, "block")),
+                  of.text(row, "block_name"),
+                  static_cast<int>(of.count(row, "track")),
+                  level_of(of, row),
+                  of.flag(row, "catch_trial"),
+                  comparison.empty() ? 0 : static_cast<int>(of.count(row, "comparison_interval"))};
+  out.outcome = {of.flag(row, "correct"), of.flag(row, "success"), !of.flag(row, "timed_out"),
+                 level_of(of, row)};
+  return out;
 }
 
 /// The study as the check compares it, from the trials and record.json.
@@ -177,12 +205,7 @@ StudyData study_of(const TextTable& table, const TrialFields& of, const Stated& 
       run.info.session = session;
       run.info.observer_sha256 = of.text(i, "observer_sha256");
     }
-    if (of.flag(i, "practice")) continue;
-    one.rows.push_back({session,
-                        of.text(i, "renderer"),
-                        of.text(i, "shape"),
-                        {of.number(i, "orientation_w"), of.number(i, "orientation_x"),
-                         of.number(i, "orientation_y"), of.number(i, "orientation_z")}});
+    one.shown.push_back(shown_trial(of, i, session));
   }
   out.removed = stated.removed;
   return out;
@@ -196,10 +219,14 @@ void put_without_trials(const Stated& stated, StudyData& study) {
   }
 }
 
-/// Judges the hypotheses by the study's own trials, with the shapes in the order of the protocol,
-/// as 'palpate check' does.
-void judge_all(const std::string& folder, const StudyData& study, bool own_only,
-               const Registration& registered, StudyCheck& check) {
+/// The study's own trials, with the shapes in the order of the protocol, as 'palpate check' has
+/// them. \param own_only  those of the protocols of the registered name
+StudyTable own_table(const std::string& folder, const StudyData& study, bool own_only,
+                     const Registration& registered, const analysis::StudyRecord& record) {
+  const std::string trials = (fs::path(folder) / kTrials).string();
+  if (!registered.protocol.blocks.empty())
+    return analysis::read_task_trials_csv(trials, own_only ? registered.protocol.name : "",
+                                          record.protocols);
   std::vector<std::string> own, order;
   for (const data::ProtocolInfo& one : study.protocols) {
     if (own_only && one.name != registered.protocol.name) continue;
@@ -208,32 +235,51 @@ void judge_all(const std::string& folder, const StudyData& study, bool own_only,
       if (std::ranges::find(order, name) == order.end()) order.push_back(name);
     }
   }
-  analysis::TrialTable table =
-      analysis::read_trials_csv((fs::path(folder) / kTrials).string(), own);
+  analysis::TrialTable table = analysis::read_trials_csv(trials, own);
   analysis::order_shapes(table, order);
-  check.label = analysis::simulated_label(table.simulated);
-  analysis::AnalysisSettings settings;
-  settings.too_fast = registered.too_fast;
+  return table;
+}
+
+void judge_all(StudyTable table, const Registration& registered, StudyCheck& check) {
+  check.label = label_of(table);
   const analysis::NamedResults results = analysis::named_results(
-      analysis::report_json(analysis::analyze(std::move(table), settings, PALPATE_VERSION)),
-      registered.alpha);
+      json_of(analyze_study(std::move(table), registered.too_fast)), registered.alpha);
   for (const analysis::Hypothesis& one : registered.hypotheses)
     check.hypotheses.emplace_back(one, analysis::judge(one, results));
 }
 
-/// The analysis from the trials in a bundle alone.
-analysis::Analysis analyze_bundle(const std::string& folder, double too_fast) {
-  analysis::TrialTable table = analysis::read_trials_csv((fs::path(folder) / kTrials).string());
+/// Whose trials are analysed: the registered protocol's, unless the study has none of its name.
+std::string protocol_of_tasks(const Registration& registered, const analysis::StudyRecord& record) {
+  const std::string& name = registered.protocol.name;
+  const bool there = std::ranges::find(record.protocols, name, &analysis::ProtocolText::name) !=
+                     record.protocols.end();
+  return there ? name : "";
+}
+
+/// The analysis of the trials in a bundle as reproduce.sh makes it.
+StudyAnalysis analyze_bundle(const std::string& folder, const Registration& registered,
+                             const analysis::StudyRecord& record) {
+  const std::string trials = (fs::path(folder) / kTrials).string();
+  if (!registered.protocol.blocks.empty()) {
+    analysis::TaskTable table = analysis::read_task_trials_csv(
+        trials, protocol_of_tasks(registered, record), record.protocols);
+    table.source = table.provenance.source = kTrials;
+    return analyze_study(std::move(table), registered.too_fast);
+  }
+  analysis::TrialTable table = analysis::read_trials_csv(trials);
   table.provenance.source = kTrials;
-  analysis::AnalysisSettings settings;
-  settings.too_fast = too_fast;
-  return analysis::analyze(std::move(table), settings, PALPATE_VERSION);
+  return analyze_study(std::move(table), registered.too_fast);
 }
 
 /// A number that the shell and the options read back exactly.
 std::string as_option(double value) { return nlohmann::json(value).dump(); }
 
-std::string reproduce_script(double too_fast) {
+std::string reproduce_script(const Registration& registered, const analysis::StudyRecord& record) {
+  std::string of_tasks;
+  if (!registered.protocol.blocks.empty()) {
+    const std::string name = protocol_of_tasks(registered, record);
+    of_tasks = " --design data/record.json" + (name.empty() ? "" : " --protocol " + name);
+  }
   return R"sh(#!/bin/sh
 # Makes analysis.json again from data/trials.csv and compares the bytes.
 # Needs palpate )sh" PALPATE_VERSION
@@ -244,7 +290,7 @@ sha256sum --check --quiet SHA256SUMS
 scratch=$(mktemp -d)
 trap 'rm -r "$scratch"' EXIT
 "${PALPATE:-palpate}" analyze --csv data/trials.csv --too-fast-s )sh" +
-         as_option(too_fast) + R"sh( \
+         as_option(registered.too_fast) + of_tasks + R"sh( \
   --json "$scratch/analysis.json" > "$scratch/analysis.txt"
 cmp "$scratch/analysis.json" analysis.json
 echo "analysis.json is reproduced"
@@ -293,7 +339,9 @@ std::string readme(const BundleFacts& facts) {
       "registration |\n"
       "| `report.html`, `figures/` | the analysis for reading |\n"
       "| `analysis.json` | every number of the analysis, made from "
-      "`data/trials.csv` alone |\n"
+      "`data/trials.csv` " +
+      std::string(protocol.blocks.empty() ? "alone" : "and the protocol in `data/record.json`") +
+      " |\n"
       "| `about.json` | authors, license, funding |\n"
       "| `ro-crate-metadata.json` | this folder described for programs, "
       "RO-Crate 1.2 |\n"
@@ -436,7 +484,7 @@ BundleFacts bundle_facts(const std::string& folder, const std::vector<CheckPoint
   out.record = stated.record;
   const TrialFields fields(out.trials, trials);
   put_servo(out.trials, fields, out.record);
-  out.analysis = analyze_bundle(folder, out.registered.too_fast);
+  out.analysis = analyze_bundle(folder, out.registered, out.record);
 
   StudyData study = study_of(out.trials, fields, stated);
   const bool own_only = !keep_study_named(out.registered.protocol.name, study).empty();
@@ -455,20 +503,21 @@ BundleFacts bundle_facts(const std::string& folder, const std::vector<CheckPoint
       *at = again;
     }
   }
-  judge_all(folder, study, own_only, out.registered, out.check);
+  judge_all(own_table(folder, study, own_only, out.registered, out.record), out.registered,
+            out.check);
   return out;
 }
 
 std::map<std::string, std::string> derived_files(const BundleFacts& facts) {
   const analysis::StudyRecord record = with_check(facts.record, facts.registered, facts.check);
   std::map<std::string, std::string> out = {
-      {"analysis.json", analysis::report_json(facts.analysis)},
+      {"analysis.json", json_of(facts.analysis)},
       {"check.json", check_json(facts.check, facts.registered)},
       {"check.html", check_html(facts.check, facts.registered)},
-      {"report.html", analysis::report_html(facts.analysis, record)},
+      {"report.html", html_of(facts.analysis, record)},
       {"README.md", readme(facts)},
-      {"reproduce.sh", reproduce_script(facts.registered.too_fast)}};
-  for (const analysis::Figure& figure : analysis::figures_of(facts.analysis, record))
+      {"reproduce.sh", reproduce_script(facts.registered, facts.record)}};
+  for (const analysis::Figure& figure : figures_of(facts.analysis, record))
     out["figures/" + figure.id + ".svg"] = analysis::figure_svg(figure, analysis::light_palette());
   return out;
 }

@@ -9,10 +9,10 @@
 #include <vector>
 
 #include "analysis/input/study_record.h"
-#include "analysis/statistics/analysis.h"
 #include "data/export/study_about.h"
 #include "runner/commands/check/deviations.h"
 #include "runner/commands/register/registration.h"
+#include "runner/commands/shared/study_analysis.h"
 
 namespace palpate::runner::commands {
 
@@ -47,7 +47,7 @@ struct BundleFacts {
   data::StudyAbout about;
   std::string format;  ///< "psych-ds", "bids"
   TextTable trials;
-  analysis::Analysis analysis;
+  StudyAnalysis analysis;
   analysis::StudyRecord record;
   StudyCheck check;
 };

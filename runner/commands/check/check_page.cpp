@@ -211,7 +211,8 @@ std::string check_html(const StudyCheck& check, const Registration& registered) 
                 {"protocol", protocol.name},
                 {"SHA-256 of the protocol", protocol.sha256},
                 {"participants", std::to_string(registered.participants)},
-                {"trials of each", std::to_string(protocols::main_trials(protocol))},
+                {"trials of each", (has_adaptive_blocks(protocol) ? "about " : "") +
+                                       std::to_string(planned_trials(protocol))},
                 {"too fast", number_text(registered.too_fast) + " s"},
                 {"alpha", number_text(registered.alpha)},
                 {"palpate", registered.program_version + ", " + registered.build}};

@@ -5,9 +5,10 @@
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
+#include <utility>
+#include <variant>
 
 #include "analysis/input/trials.h"
-#include "analysis/report/report.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"
 #include "data/base/json_text.h"
@@ -20,7 +21,10 @@
 #include "runner/commands/register/registration_text.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/sealed_folder.h"
+#include "runner/commands/shared/study_analysis.h"
+#include "runner/commands/shared/study_order.h"
 #include "runner/participants/simulated_settings.h"
+#include "runner/session/session_plan.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -29,12 +33,28 @@ using analysis::counted;
 
 /// Most lines of evidence; the rest is counted: "; and 12 more".
 constexpr std::size_t kMostEvidence = 50;
+/// Of a reported analysis of tasks.
+constexpr std::size_t kMostCells = 100'000;
 
 void cut(std::vector<std::string>& evidence) {
   if (evidence.size() <= kMostEvidence) return;
   const std::size_t more = evidence.size() - kMostEvidence;
   evidence.resize(kMostEvidence);
   evidence.push_back("and " + std::to_string(more) + " more");
+}
+
+ShownTrial shown_trial(const data::TrialRecord& record) {
+  ShownTrial out;
+  out.row = {record.session, record.renderer, record.shape, record.orientation_wxyz};
+  out.practice = record.practice;
+  out.outcome = session::outcome_of(record);
+  const data::TaskRecord& task = record.task;
+  if (!task.of_block()) return out;
+  out.row.task = {record.block, task.block_name, task.track, task.level, task.catch_trial, 0};
+  for (std::size_t i = 0; task.task == "compare" && i < task.intervals.size(); ++i) {
+    if (!task.intervals[i].standard) out.row.task->comparison = static_cast<int>(i) + 1;
+  }
+  return out;
 }
 
 StudyData read_study(data::Store& store) {
@@ -48,9 +68,7 @@ StudyData read_study(data::Store& store) {
   store.for_each_trial([&](const data::StoredTrial& trial) {
     if (out.participants.empty() || out.participants.back().person.id != trial.participant.id)
       out.participants.push_back({trial.participant, trial.protocol_sha256, {}});
-    if (trial.record.practice) return;
-    out.participants.back().rows.push_back({trial.record.session, trial.record.renderer,
-                                            trial.record.shape, trial.record.orientation_wxyz});
+    out.participants.back().shown.push_back(shown_trial(trial.record));
   });
   return out;
 }
@@ -183,6 +201,14 @@ std::map<int, std::vector<OrderRow>> by_session(const std::vector<OrderRow>& row
   return out;
 }
 
+std::vector<OrderRow> rows_that_count(const std::vector<ShownTrial>& shown) {
+  std::vector<OrderRow> out;
+  for (const ShownTrial& one : shown) {
+    if (!one.practice) out.push_back(one.row);
+  }
+  return out;
+}
+
 /// The place where the shown trials first differ from the order; "": nowhere.
 std::string order_difference(const std::vector<OrderRow>& expected,
                              const std::vector<OrderRow>& shown) {
@@ -212,18 +238,18 @@ CheckPoint of_order(const Registration& registered, const StudyData& study) {
       out.evidence.push_back(who + ": there is no such number");
       continue;
     }
-    const std::vector<OrderRow> expected = order_of(registered.protocol, number);
     const auto at = static_cast<std::size_t>(number) - 1;
     if (at >= registered.order_sha256.size()) {
       ++beyond;
-    } else if (order_checksum(expected) != registered.order_sha256[at]) {
-      out.evidence.push_back(who + ": the registered order has SHA-256 " +
-                             short_sum(registered.order_sha256[at]) +
-                             "; this program makes another one of the registered protocol, " +
-                             short_sum(order_checksum(expected)));
+    } else if (const std::string sha256 = order_checksum(registered.protocol, number);
+               sha256 != registered.order_sha256[at]) {
+      out.evidence.push_back(
+          who + ": the registered order has SHA-256 " + short_sum(registered.order_sha256[at]) +
+          "; this program makes another one of the registered protocol, " + short_sum(sha256));
       continue;
     }
-    const std::string differs = order_difference(expected, one.rows);
+    const std::string differs = order_difference(
+        expected_trials(registered.protocol, number, one.shown).rows, rows_that_count(one.shown));
     if (!differs.empty()) out.evidence.push_back(who + ": " + differs);
   }
   out.sentence = "Every participant's trials came in the order that was registered for the number.";
@@ -241,41 +267,32 @@ CheckPoint of_order(const Registration& registered, const StudyData& study) {
 /// "point, then ray" -> number of participants.
 using OrderCounts = std::map<std::string, std::size_t>;
 
-/// The order in which the renderers first came.
-std::string renderers_in_order(const std::vector<OrderRow>& rows) {
-  std::vector<std::string> seen;
-  for (const OrderRow& row : rows) {
-    if (std::ranges::find(seen, row.renderer) == seen.end()) seen.push_back(row.renderer);
-  }
-  std::string out;
-  for (const std::string& renderer : seen) out += (out.empty() ? "" : ", then ") + renderer;
-  return out;
-}
-
-/// Empty where the renderers' order is not counterbalanced.
+/// Empty where the order is not counterbalanced.
 OrderCounts registered_orders(const Registration& registered) {
   OrderCounts out;
-  const auto repeat = static_cast<std::size_t>(protocols::renderer_orders(registered.protocol));
+  const auto repeat = static_cast<std::size_t>(condition_orders(registered.protocol));
   if (repeat < 2) return out;
   for (std::size_t i = 0; i < std::min(repeat, registered.participants); ++i)
-    out[renderers_in_order(order_of(registered.protocol, static_cast<int>(i) + 1))] +=
+    out[condition_order(registered.protocol, static_cast<int>(i) + 1)] +=
         (registered.participants - i + repeat - 1) / repeat;
   return out;
 }
 
 /// "Order of the renderers: point, then ray: 3 (3 registered); ray, then point: 0 (3 registered)."
-std::string orders_text(OrderCounts registered, const StudyData& study) {
+std::string orders_text(const Registration& statement, const StudyData& study) {
+  OrderCounts registered = registered_orders(statement);
   if (registered.empty()) return "";
   OrderCounts shown;
   for (const StudyParticipant& one : study.participants) {
-    if (!one.rows.empty()) ++shown[renderers_in_order(one.rows)];
+    if (const std::string order = condition_order(one.shown); !order.empty()) ++shown[order];
   }
   for (const auto& [order, n] : shown) registered.try_emplace(order, 0);
   std::string out;
   for (const auto& [order, n] : registered)
     out += (out.empty() ? "" : "; ") + printable(order) + ": " + std::to_string(shown[order]) +
            " (" + std::to_string(n) + " registered)";
-  return "Order of the renderers: " + out + ".";
+  return std::string("Order of the ") +
+         (statement.protocol.blocks.empty() ? "renderers" : "blocks") + ": " + out + ".";
 }
 
 /// Who began a session and completed no trial, each once.
@@ -321,7 +338,7 @@ CheckPoint of_participants(const Registration& registered, const StudyData& stud
     out.evidence.push_back(counted(study.removed, "code was", "codes were") +
                            " removed from the database with 'palpate forget'; it does not keep "
                            "their numbers, trials or protocol");
-  const std::string orders = orders_text(registered_orders(registered), study);
+  const std::string orders = orders_text(registered, study);
   if (!out.evidence.empty() || n != planned) {
     out.finding = Finding::deviation;
     out.sentence =
@@ -335,19 +352,29 @@ CheckPoint of_participants(const Registration& registered, const StudyData& stud
 }
 
 CheckPoint of_trials(const Registration& registered, const StudyData& study) {
-  const auto planned = static_cast<std::size_t>(protocols::main_trials(registered.protocol));
-  CheckPoint out{
-      "trials", "Number of trials", Finding::as_registered,
-      "Every participant has the registered " + counted(planned, "trial", "trials") + "."};
+  const std::size_t planned = planned_trials(registered.protocol);
+  const bool adaptive = has_adaptive_blocks(registered.protocol);
+  const std::string registered_words =
+      adaptive ? "trials up to the end of every procedure"
+               : "the registered " + counted(planned, "trial", "trials");
+  CheckPoint out{"trials", "Number of trials", Finding::as_registered,
+                 "Every participant has " + registered_words + "."};
   for (const StudyParticipant& one : study.participants) {
-    if (one.rows.size() != planned)
-      out.evidence.push_back(one.person.code + ": " + std::to_string(one.rows.size()) + " of " +
-                             std::to_string(planned) + " trials");
+    const int number = std::max(1, one.person.enrolled_number);
+    const std::size_t found = rows_that_count(one.shown).size();
+    if (adaptive ? expected_trials(registered.protocol, number, one.shown).complete
+                 : found == planned)
+      continue;
+    out.evidence.push_back(one.person.code + ": " + std::to_string(found) +
+                           (adaptive ? " trials, and not at the end of every session"
+                                     : " of " + std::to_string(planned) + " trials"));
   }
   if (out.evidence.empty()) return out;
   out.finding = Finding::deviation;
-  out.sentence = counted(out.evidence.size(), "participant has", "participants have") +
-                 " another number of trials than the registered " + std::to_string(planned) + ".";
+  out.sentence =
+      counted(out.evidence.size(), "participant has", "participants have") +
+      (adaptive ? " not all trials."
+                : " another number of trials than the registered " + std::to_string(planned) + ".");
   cut(out.evidence);
   return out;
 }
@@ -416,6 +443,8 @@ CheckPoint of_exclusion(const Registration& registered, const ReportedAnalysis& 
   CheckPoint out{"exclusion", "Exclusion of times", Finding::as_registered,
                  "Correct answers faster than " + seconds(registered.too_fast) +
                      " are left out of the times, as registered."};
+  if (!registered.protocol.blocks.empty() && registered.typical_time == 0)
+    out.sentence = "Nothing is identified: there are no times to leave out.";
   const double used = reported.too_fast.value_or(registered.too_fast);
   if (used == registered.too_fast) return out;
   out.finding = Finding::deviation;
@@ -512,15 +541,13 @@ std::vector<std::string> shapes_of(const std::string& analysis_json) {
 }
 
 /// Compares the numbers of an analysis as reported with those of the registered analysis.
-CheckPoint of_reported(analysis::TrialTable table, const ReportedAnalysis& reported,
-                       double too_fast) {
+CheckPoint of_reported(StudyTable table, const ReportedAnalysis& reported, double too_fast) {
   CheckPoint out{"analysis", "Reported numbers", Finding::as_registered,
                  "Every number of the reported analysis is that of these data."};
-  analysis::AnalysisSettings settings;
-  settings.too_fast = too_fast;
-  analysis::order_shapes(table, shapes_of(reported.json));
-  const analysis::NamedResults ours = analysis::named_results(
-      analysis::report_json(analysis::analyze(std::move(table), settings, PALPATE_VERSION)), 0);
+  if (auto* const times = std::get_if<analysis::TrialTable>(&table))
+    analysis::order_shapes(*times, shapes_of(reported.json));
+  const analysis::NamedResults ours =
+      analysis::named_results(json_of(analyze_study(std::move(table), too_fast)), 0);
   const analysis::NamedResults theirs = analysis::named_results(reported.json, 0);
   const auto text = [](const analysis::NamedResults& of, const std::string& name) {
     const auto found = of.find(name);
@@ -579,18 +606,25 @@ ReportedAnalysis read_reported(const std::string& text, const std::string& file)
   protocols::FaultList faults(file);
   const nlohmann::json json = protocols::read_json(text, faults);
   protocols::ObjectReader reader(json, "", faults);
-  double too_fast = 0;
-  const auto read_object = [&](protocols::ObjectReader& object) {
-    if (object.pointer() == "/settings")
-      object.number("too_fast_s", too_fast, {0, kMostTooFast, "s", true},
-                    protocols::Presence::required);
+  const bool of_tasks = json.is_object() && json.contains("cells");
+  std::optional<double> too_fast;
+  const auto read_object = [&](const nlohmann::json& value, const std::string& pointer) {
+    protocols::ObjectReader object(value, pointer, faults);
+    if (!pointer.ends_with("/settings")) return;
+    double limit = 0;
+    object.number("too_fast_s", limit, {0, kMostTooFast, "s", true}, protocols::Presence::required);
+    too_fast = limit;
   };
-  for (const char* key : {"settings", "paired_by_shape", "accuracy"}) {
-    if (const auto* value = reader.member(key, protocols::Presence::required)) {
-      protocols::ObjectReader object(*value, reader.pointer(key), faults);
-      read_object(object);
+  if (of_tasks) {
+    reader.array("cells", 1, kMostCells, protocols::Presence::required);
+  } else {
+    for (const char* key : {"settings", "paired_by_shape", "accuracy"}) {
+      if (const auto* value = reader.member(key, protocols::Presence::required))
+        read_object(*value, reader.pointer(key));
     }
   }
+  if (of_tasks && json.contains(nlohmann::json::json_pointer("/identification/settings")))
+    read_object(json["identification"]["settings"], "/identification/settings");
   if (!faults.empty())
     faults.add("", "expected what 'palpate analyze --json' wrote for this study");
   faults.throw_if_any();
@@ -621,14 +655,12 @@ StudyCheck check_study(const Registration& registered, const std::string& folder
                      " withdrawn and must not be used; remove with 'palpate forget' first");
   const CheckPoint protocol = of_protocol(registered, study);
   const std::string name = keep_study_named(registered.protocol.name, study);
-  const analysis::TrialTable table = analysis::read_trials_store(database, name);
-  analysis::AnalysisSettings settings;
-  settings.too_fast = registered.too_fast;
-  const analysis::NamedResults results = analysis::named_results(
-      analysis::report_json(analysis::analyze(table, settings, PALPATE_VERSION)), registered.alpha);
+  const StudyTable table = read_study_table(database, name);
+  const analysis::NamedResults results =
+      analysis::named_results(json_of(analyze_study(table, registered.too_fast)), registered.alpha);
 
   StudyCheck out;
-  out.label = analysis::simulated_label(table.simulated);
+  out.label = label_of(table);
   out.participants = study.participants.size();
   out.removed = study.removed;
   out.without_trials = people_without_trials(study);

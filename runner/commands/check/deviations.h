@@ -11,6 +11,7 @@
 #include "analysis/report/hypotheses.h"
 #include "data/store/store.h"
 #include "runner/commands/register/registration.h"
+#include "runner/commands/shared/study_order.h"
 
 namespace palpate::runner::commands {
 
@@ -32,7 +33,7 @@ struct CheckPoint {
 struct StudyParticipant {
   data::Participant person;
   std::string protocol_sha256;
-  std::vector<OrderRow> rows;  ///< trials that count, in their order
+  std::vector<ShownTrial> shown;  ///< practice or not, in their order
 };
 
 /// What of a study is compared, from a database or a bundle.

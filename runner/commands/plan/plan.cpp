@@ -15,6 +15,7 @@
 
 #include "analysis/figures/svg.h"
 #include "analysis/report/coverage_report.h"
+#include "analysis/report/plan_record.h"
 #include "analysis/report/plan_report.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/comparison.h"
@@ -32,7 +33,7 @@ namespace palpate::runner::commands {
 
 struct ThresholdOptions {
   /// Of one of kMeasureOptions.
-  double jnd = 0, pse = 0, threshold = 0, accuracy_points = 0, rating = 0;
+  double jnd = 0, pse = 0, threshold = 0, accuracy_points = 0, rating = 0, exponent = 0;
   double weber = 0.1, participant_sd = 0.3, effect_sd = 0.2, pse_sd = 0.5, reach = 2.5;
   double accuracy = 0.8, equivalence = 0;
 };
@@ -48,7 +49,8 @@ constexpr MeasureOption kMeasureOptions[] = {
     {"pse-effect", analysis::PlannedMeasure::pse, &ThresholdOptions::pse},
     {"threshold-effect", analysis::PlannedMeasure::threshold, &ThresholdOptions::threshold},
     {"accuracy-effect", analysis::PlannedMeasure::accuracy, &ThresholdOptions::accuracy_points},
-    {"rating-effect", analysis::PlannedMeasure::rating, &ThresholdOptions::rating}};
+    {"rating-effect", analysis::PlannedMeasure::rating, &ThresholdOptions::rating},
+    {"exponent-effect", analysis::PlannedMeasure::exponent, &ThresholdOptions::exponent}};
 void add_threshold_options(CommandLine& line, ThresholdOptions& options);
 /// Prints the plan, and writes its JSON. \throws UsageError
 void plan_thresholds_of(const ThresholdOptions& thresholds, const MeasureOption& measure,
@@ -337,6 +339,7 @@ double on_scale(analysis::PlannedMeasure measure, double effect) {
   switch (measure) {
     case analysis::PlannedMeasure::jnd:
     case analysis::PlannedMeasure::threshold:
+    case analysis::PlannedMeasure::exponent:
       return std::log1p(-effect / 100);
     case analysis::PlannedMeasure::accuracy:
       return effect / 100;
@@ -353,6 +356,7 @@ void require_effect(const MeasureOption& option, double effect, double accuracy)
   switch (option.measure) {
     case analysis::PlannedMeasure::jnd:
     case analysis::PlannedMeasure::threshold:
+    case analysis::PlannedMeasure::exponent:
       return require(within(-400, 95), option.name, "percent from -400 to 95");
     case analysis::PlannedMeasure::accuracy:
       return require(within(-100 * accuracy + 1, 100 * (1 - accuracy) - 1), option.name,
@@ -427,6 +431,8 @@ void add_threshold_options(CommandLine& line, ThresholdOptions& options) {
       "of accuracy: how many percentage points higher with the second");
   add("rating-effect", po::value(&options.rating)->value_name("STEPS"),
       "of mean ratings on seven steps: how much higher with the second");
+  add("exponent-effect", po::value(&options.exponent)->value_name("PERCENT"),
+      "of exponents of magnitude estimation: how much smaller with the second");
   add("equivalence", po::value(&options.equivalence)->value_name("BOUND"),
       "show equivalence within this bound instead, in the unit of the effect; with an effect of 0");
   add("accuracy", po::value(&options.accuracy)->default_value(0.8, "0.8")->value_name("SHARE"),
@@ -434,7 +440,7 @@ void add_threshold_options(CommandLine& line, ThresholdOptions& options) {
   add("weber", po::value(&options.weber)->default_value(0.1, "0.1")->value_name("W"),
       "JND / standard with the first condition");
   add("jnd-sd", po::value(&options.participant_sd)->default_value(0.3, "0.3")->value_name("SD"),
-      "of participants' log JND or threshold; of log odds and ratings 0.7");
+      "of participants' log JND, threshold or exponent; of log odds and ratings 0.7");
   add("jnd-effect-sd", po::value(&options.effect_sd)->default_value(0.2, "0.2")->value_name("SD"),
       "of participants' differences: log ratios, JNDs; of log odds and ratings 0.5");
   add("pse-sd", po::value(&options.pse_sd)->default_value(0.5, "0.5")->value_name("SD"),
@@ -537,7 +543,8 @@ int plan_command(const std::vector<std::string>& args) {
       R"(palpate plan ((--db FILE | --csv FILE) [--protocol NAME] | --gain-sd SD --residual-sd SD)
            [--effect SHAPE=PERCENT,...]
        palpate plan (--jnd-effect PERCENT | --pse-effect JNDS | --threshold-effect PERCENT |
-           --accuracy-effect POINTS | --rating-effect STEPS) [--equivalence BOUND]
+           --accuracy-effect POINTS | --rating-effect STEPS | --exponent-effect PERCENT)
+           [--equivalence BOUND]
        palpate plan --coverage [--studies N] [--seed S])";
   line.summary =
       "Sample size planning: the number of participants and trials that find an effect with a\n"
@@ -586,7 +593,7 @@ int plan_command(const std::vector<std::string>& args) {
   if (values->count("equivalence"))
     throw UsageError(
         "--equivalence: expected one of --jnd-effect, --pse-effect, --threshold-effect, "
-        "--accuracy-effect and --rating-effect");
+        "--accuracy-effect, --rating-effect and --exponent-effect");
   analysis::PlanSettings settings = settings_of(options, *values);
   analysis::Pilot pilot = starting_point(options, *values);
   analysis::StudyModel model = model_of(pilot, options, *values);

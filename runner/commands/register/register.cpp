@@ -2,13 +2,11 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <functional>
 #include <iostream>
-#include <mutex>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
@@ -17,250 +15,31 @@
 #include <utility>
 #include <vector>
 
-#include "analysis/input/trials.h"
-#include "analysis/report/plan_report.h"
-#include "analysis/report/report.h"
-#include "analysis/statistics/analysis.h"
-#include "analysis/statistics/jobs.h"
-#include "analysis/statistics/power.h"
+#include "analysis/report/plan_record.h"
 #include "analysis/statistics/sensitivity.h"
 #include "analysis/text.h"
-#include "data/base/checksum.h"
 #include "data/base/json_text.h"
-#include "data/base/random.h"
 #include "data/base/text.h"
-#include "data/export/csv.h"
 #include "data/files/atomic_folder.h"
 #include "data/store/store.h"
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "protocols/protocol.h"
-#include "protocols/schedule.h"
 #include "runner/build_info.h"
+#include "runner/commands/register/answers.h"
+#include "runner/commands/register/planned_conditions.h"
+#include "runner/commands/register/planned_studies.h"
 #include "runner/commands/register/registration.h"
 #include "runner/commands/register/registration_text.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/progress_line.h"
-#include "runner/commands/shared/protocol_choice.h"
 #include "runner/commands/shared/sealed_folder.h"
+#include "runner/commands/shared/study_order.h"
 #include "runner/participants/simulated_settings.h"
 #include "runner/session/run_record.h"
-#include "runner/session/simulated_study.h"
 
 namespace palpate::runner::commands {
 namespace {
-
-// Studies simulated from a plan's model before there are data, to rehearse the analysis and the
-// hypotheses.
-
-class PlannedStudies {
- public:
-  /// The shapes of the model are those of the protocol, which has two renderers.
-  PlannedStudies(const protocols::Protocol& protocol, const analysis::StudyModel& model,
-                 std::size_t participants, std::uint64_t seed);
-
-  /// s; the plan has only ratios of times, so this is the geometric middle between the limit of too
-  /// fast answers and the time-out, to lose the fewest trials at either end.
-  static double typical_time(const protocols::Protocol& protocol, double too_fast);
-
-  /// Writes a study with the planned effect, or none, as 'palpate export' writes data.
-  /// \param folder  for a database, which is removed again \param csv  the file
-  /// \param codebook  the file; "": none
-  void write(const std::string& folder, const std::string& csv, const std::string& codebook,
-             bool with_effect, double typical_time) const;
-
-  /// Verdicts on hypotheses in studies with the planned effect and in as many without; the first of
-  /// each are those of write(). The result does not depend on `jobs`.
-  /// \param first  the trials of the first study \param progress  called with the share that is
-  /// done
-  std::vector<Rehearsal> rehearse(const analysis::TrialTable& first,
-                                  const Registration& registration, std::size_t studies,
-                                  std::size_t jobs,
-                                  const std::function<void(double)>& progress) const;
-
- private:
-  struct Outcome {
-    bool correct = false, timed_out = false;
-    std::size_t answer = 0;  ///< shape of the model
-    double time = 0;         ///< s
-  };
-  /// Of all trials of a participant, practice included.
-  std::vector<Outcome> outcomes(std::size_t participant, std::size_t study, bool with_effect,
-                                double typical_time) const;
-  analysis::TrialTable table(const analysis::TrialTable& like, std::size_t study, bool with_effect,
-                             double typical_time) const;
-
-  const protocols::Protocol& protocol_;
-  analysis::StudyModel model_, no_effect_;
-  std::uint64_t seed_;
-  std::vector<std::vector<protocols::Trial>> schedules_;  ///< by participant
-  std::vector<std::size_t> shape_of_stimulus_;            ///< index into the model's
-};
-
-constexpr std::int64_t kSecond_ns = 1'000'000'000, kDay_ns = 86'400 * kSecond_ns;
-constexpr std::int64_t kFirstMorning_ns = 946'717'200 * kSecond_ns;  // 2000-01-01T09:00:00Z
-constexpr double kBetweenTrials = 5;                                 // s
-
-PlannedStudies::PlannedStudies(const protocols::Protocol& protocol,
-                               const analysis::StudyModel& model, std::size_t participants,
-                               std::uint64_t seed)
-    : protocol_(protocol), model_(model), no_effect_(analysis::without_effect(model)), seed_(seed) {
-  for (std::size_t p = 0; p < participants; ++p)
-    schedules_.push_back(protocols::schedule(protocol, static_cast<int>(p) + 1));
-  for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
-    shape_of_stimulus_.push_back(static_cast<std::size_t>(
-        std::ranges::find(model.shapes, stimulus.name) - model.shapes.begin()));
-}
-
-double PlannedStudies::typical_time(const protocols::Protocol& protocol, double too_fast) {
-  return std::sqrt(too_fast * protocol.response.time_out);
-}
-
-std::vector<PlannedStudies::Outcome> PlannedStudies::outcomes(std::size_t participant,
-                                                              std::size_t study, bool with_effect,
-                                                              double typical_time) const {
-  std::vector<analysis::ModelTrial> trials;
-  for (const protocols::Trial& trial : schedules_[participant])
-    trials.push_back({shape_of_stimulus_[static_cast<std::size_t>(trial.stimulus)],
-                      trial.renderer == protocols::RendererKind::ray});
-  Random random(seed_, {with_effect ? 1U : 0U, study, participant});
-  const auto answers =
-      analysis::draw_answers(with_effect ? model_ : no_effect_, typical_time, trials, random);
-  std::vector<Outcome> out;
-  for (std::size_t i = 0; i < trials.size(); ++i) {
-    Outcome& one = out.emplace_back();
-    one.time = answers[i].time;
-    one.answer = (trials[i].shape + answers[i].other) % model_.shapes.size();
-    one.timed_out = one.time >= protocol_.response.time_out ||
-                    (!answers[i].usable && one.answer == trials[i].shape);
-    one.correct = !one.timed_out && one.answer == trials[i].shape;
-    if (one.timed_out) one.time = protocol_.response.time_out;
-  }
-  return out;
-}
-
-void PlannedStudies::write(const std::string& folder, const std::string& csv,
-                           const std::string& codebook, bool with_effect,
-                           double typical_time) const {
-  namespace fs = std::filesystem;
-  fs::create_directory(folder);
-  data::Store store = data::Store::open((fs::path(folder) / "study.db").string(),
-                                        data::Store::Mode::write_or_create);
-  const data::ProtocolInfo info = session::info_of(protocol_);
-  for (std::size_t p = 0; p < schedules_.size(); ++p) {
-    const int number = static_cast<int>(p) + 1;
-    const data::Participant participant =
-        store.enrol(info, session::simulated_code(number), number, true, seed_);
-    const std::vector<Outcome> all = outcomes(p, 0, with_effect, typical_time);
-    for (int session = 1; session <= protocol_.sessions.count; ++session) {
-      data::RunInfo run_info;
-      run_info.session = session;
-      run_info.clock = {
-          kFirstMorning_ns +
-              (static_cast<std::int64_t>(p) * protocol_.sessions.count + session - 1) * kDay_ns,
-          0};
-      run_info.program_version = PALPATE_VERSION;
-      run_info.build = build_description();
-      run_info.device = run_info.response_device = "none: drawn from the model of a plan";
-      std::vector<data::TrialRecord> records;
-      double now = 0;
-      for (std::size_t i = 0; i < all.size(); ++i) {
-        const protocols::Trial& trial = schedules_[p][i];
-        if (trial.session != session) continue;
-        data::TrialRecord& record = records.emplace_back();
-        record.session = session;
-        record.block = trial.block;
-        record.trial = trial.trial;
-        record.renderer = protocols::to_string(trial.renderer);
-        record.shape = protocol_.stimuli[static_cast<std::size_t>(trial.stimulus)].name;
-        if (!all[i].timed_out) record.response = model_.shapes[all[i].answer];
-        record.correct = all[i].correct;
-        record.timed_out = all[i].timed_out;
-        record.practice = trial.practice;
-        record.orientation_wxyz = {trial.orientation.w, trial.orientation.x, trial.orientation.y,
-                                   trial.orientation.z};
-        record.response_time = all[i].time;
-        record.onset_ns = std::llround(1e9 * now);
-        record.response_ns = std::llround(1e9 * (now + all[i].time));
-        now += all[i].time + kBetweenTrials;
-      }
-      if (records.empty()) continue;
-      const data::Run run = store.begin_run(participant, run_info);
-      store.record_simulated(run, records);
-      store.end_run(run, data::RunEnd::done, records.back().response_ns);
-    }
-  }
-  data::ExportSettings settings = export_settings();
-  settings.codebook = codebook;
-  data::export_csv(store, csv, settings);
-}
-
-analysis::TrialTable PlannedStudies::table(const analysis::TrialTable& like, std::size_t study,
-                                           bool with_effect, double typical_time) const {
-  analysis::TrialTable out = like;
-  out.rows.clear();
-  out.rows.reserve(like.rows.size());
-  const auto at = [](const std::vector<std::string>& names, const std::string& name) {
-    return static_cast<std::size_t>(std::ranges::find(names, name) - names.begin());
-  };
-  const std::array<std::size_t, 2> renderer = {at(like.renderers, "point"),
-                                               at(like.renderers, "ray")};
-  std::vector<std::size_t> shapes, answers;
-  for (const std::string& shape : model_.shapes) {
-    shapes.push_back(at(like.shapes, shape));
-    answers.push_back(at(like.answers, shape));
-  }
-  for (std::size_t p = 0; p < schedules_.size(); ++p) {
-    const std::vector<Outcome> all = outcomes(p, study, with_effect, typical_time);
-    std::uint32_t position = 0;
-    std::array<std::uint32_t, 2> exposure{};
-    for (std::size_t i = 0; i < all.size(); ++i) {
-      const protocols::Trial& trial = schedules_[p][i];
-      if (trial.practice) continue;
-      const std::size_t r = trial.renderer == protocols::RendererKind::ray ? 1 : 0;
-      analysis::TrialRow row;
-      row.participant = static_cast<std::uint32_t>(p);
-      row.renderer = static_cast<std::uint16_t>(renderer[r]);
-      row.shape = static_cast<std::uint16_t>(
-          shapes[shape_of_stimulus_[static_cast<std::size_t>(trial.stimulus)]]);
-      row.answer = all[i].timed_out ? -1 : static_cast<std::int32_t>(answers[all[i].answer]);
-      row.correct = all[i].correct;
-      row.timed_out = all[i].timed_out;
-      row.response_time = all[i].time;
-      row.position = ++position;
-      row.exposure = ++exposure[r];
-      out.rows.push_back(row);
-    }
-  }
-  return out;
-}
-
-std::vector<Rehearsal> PlannedStudies::rehearse(const analysis::TrialTable& first,
-                                                const Registration& registration,
-                                                std::size_t studies, std::size_t jobs,
-                                                const std::function<void(double)>& progress) const {
-  const std::vector<analysis::Hypothesis>& hypotheses = registration.hypotheses;
-  std::vector<Rehearsal> out(hypotheses.size());
-  analysis::AnalysisSettings settings;
-  settings.too_fast = registration.too_fast;
-  std::mutex mutex;
-  const auto one_study = [&](std::size_t i) {
-    const bool with_effect = i < studies;
-    const analysis::Analysis analysis = analysis::analyze(
-        table(first, i % studies, with_effect, registration.typical_time), settings, "");
-    const analysis::NamedResults results =
-        analysis::named_results(analysis::report_json(analysis), registration.alpha);
-    std::vector<analysis::Verdict> verdicts;
-    verdicts.reserve(hypotheses.size());
-    for (const analysis::Hypothesis& one : hypotheses)
-      verdicts.push_back(analysis::judge(one, results).verdict);
-    const std::lock_guard lock(mutex);
-    for (std::size_t h = 0; h < out.size(); ++h)
-      (with_effect ? out[h].with_effect : out[h].without_effect).add(verdicts[h]);
-  };
-  analysis::do_jobs(2 * studies, jobs, one_study, progress);
-  return out;
-}
 
 namespace po = boost::program_options;
 namespace fs = std::filesystem;
@@ -269,7 +48,8 @@ constexpr const char* kMark = "registration.json";
 
 struct RegisterOptions {
   std::string protocol, plan, hypotheses, out, database;
-  std::size_t participants = 0, studies = 200, jobs = 1;
+  std::size_t participants = 0, jobs = 1;
+  std::optional<std::size_t> studies;
   double too_fast = 0.2;
   std::uint64_t seed = 1;
   bool force = false;
@@ -309,8 +89,11 @@ hypotheses.json:
       "correct answers faster than this will be excluded from the times");
   add("db", po::value(&options.database)->value_name("FILE"),
       "the study's database, if it exists; the registration states its number of sessions");
-  add("studies", po::value(&options.studies)->default_value(200)->value_name("N"),
-      "simulated with the planned effect, and as many with none");
+  std::size_t studies = 0;
+  add("studies", po::value(&studies)->value_name("N"),
+      "simulated with the planned effect, and as many with none; default: 200, with blocks of "
+      "tasks "
+      "20");
   add("seed", po::value(&options.seed)->default_value(1)->value_name("S"),
       "of the simulated studies");
   add("jobs", po::value(&options.jobs)->default_value(options.jobs)->value_name("J"),
@@ -324,7 +107,8 @@ hypotheses.json:
     throw UsageError("--participants: must be 2 to " + std::to_string(kMostParticipants));
   if (!(options.too_fast > 0 && options.too_fast <= kMostTooFast))
     throw UsageError("--too-fast-s: must be above 0, at most 60 s");
-  if (options.studies < 20 || options.studies > 100'000)
+  if (values->count("studies")) options.studies = studies;
+  if (options.studies && (*options.studies < 20 || *options.studies > 100'000))
     throw UsageError("--studies: must be 20 to 100000");
   if (options.jobs < 1 || options.jobs > 256) throw UsageError("--jobs: must be 1 to 256");
   return options;
@@ -345,38 +129,16 @@ protocols::Protocol read_protocol(const std::string& path) {
   return protocol;
 }
 
-/// The plan, with a curve for the protocol's trials and the same shapes. \throws UsageError
 analysis::PlanRecord read_fitting_plan(const std::string& path, const std::string& text,
                                        const protocols::Protocol& protocol) {
   analysis::PlanRecord plan = analysis::read_plan(text, path);
-  std::vector<std::string> planned = plan.model.shapes, shown;
-  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) shown.push_back(stimulus.name);
-  std::ranges::sort(planned);
-  std::ranges::sort(shown);
-  if (planned != shown)
-    throw UsageError(path + ": /model/log_ratio: expected a plan for the protocol's shapes (" +
-                     printable(analysis::joined(shown)) + "); this one is for " +
-                     printable(analysis::joined(planned)));
-  const auto trials = static_cast<std::size_t>(protocol.repetitions);
-  std::string others;
-  for (const auto& curve : plan.curves) {
-    if (curve.trials == trials) return plan;
-    others += (others.empty() ? "" : ", ") + std::to_string(curve.trials);
-  }
-  throw UsageError(path + ": /needed: expected a plan for the protocol's " +
-                   std::to_string(trials) +
-                   " trials of each shape with each renderer; this one is for " + others +
-                   ": plan again with --trials " + std::to_string(trials));
-}
-
-const analysis::PlanRecord::Curve& curve_of(const Registration& made) {
-  return *std::ranges::find(made.plan.curves, static_cast<std::size_t>(made.protocol.repetitions),
-                            &analysis::PlanRecord::Curve::trials);
+  require_fitting(plan, path, protocol);
+  return plan;
 }
 
 std::size_t sample_size(const RegisterOptions& options, const Registration& made) {
   if (options.participants > 0) return options.participants;
-  if (const auto& needed = curve_of(made).participants) {
+  if (const auto& needed = fitting_curve(made.protocol, made.plan).participants) {
     if (*needed >= 2 && *needed <= kMostParticipants) return *needed;
   }
   throw UsageError(options.plan +
@@ -429,7 +191,7 @@ void warn_of_hypothesis(const analysis::Hypothesis& one, const Rehearsal& rehear
 
 std::vector<std::string> warnings_of(const Registration& made) {
   std::vector<std::string> out;
-  const auto& curve = curve_of(made);
+  const auto& curve = fitting_curve(made.protocol, made.plan);
   const auto power = curve.power.find(made.participants);
   if (!curve.participants) {
     out.push_back("The plan reaches its power with no number of participants in its range.");
@@ -440,30 +202,22 @@ std::vector<std::string> warnings_of(const Registration& made) {
                        ? "."
                        : ", with a power of " + analysis::fixed(100 * power->second, 0) + " %."));
   }
-  const auto orders = static_cast<std::size_t>(protocols::renderer_orders(made.protocol));
+  const auto orders = static_cast<std::size_t>(condition_orders(made.protocol));
+  const bool tasks = !made.protocol.blocks.empty();
   if (made.participants % orders != 0)
-    out.push_back("The orders of the renderers repeat after " + std::to_string(orders) +
-                  " participants: with " + std::to_string(made.participants) +
-                  " they are not balanced.");
+    out.push_back(std::string("The orders of the ") + (tasks ? "blocks" : "renderers") +
+                  " repeat after " + std::to_string(orders) + " participants: with " +
+                  std::to_string(made.participants) + " they are not balanced.");
   if (!made.plan.pilot_label.empty())
     out.push_back("The plan rests on " + made.plan.pilot_label +
                   ": their standard deviations are a model's.");
+  if (tasks && !conditions_of(made.protocol, made.plan).differ)
+    out.emplace_back(
+        "The plan is of a difference between two conditions; the protocol has one. The simulated "
+        "studies with the planned effect and with none are alike.");
   for (std::size_t h = 0; h < made.hypotheses.size(); ++h)
     warn_of_hypothesis(made.hypotheses[h], made.rehearsals[h], made.plan.power, out);
   return out;
-}
-
-std::string analyzed(const analysis::TrialTable& table, double too_fast) {
-  analysis::AnalysisSettings settings;
-  settings.too_fast = too_fast;
-  return analysis::report_json(analysis::analyze(table, settings, PALPATE_VERSION));
-}
-
-/// The trials of a file in the draft, under its name there.
-analysis::TrialTable read_table(const data::AtomicFolder& draft, const std::string& name) {
-  analysis::TrialTable table = analysis::read_trials_csv(draft / name);
-  table.provenance.source = name;
-  return table;
 }
 
 /// Writes simulated studies, their analyses and their verdicts on the hypotheses.
@@ -471,19 +225,16 @@ void put_simulated(const RegisterOptions& options, const data::AtomicFolder& dra
                    Registration& made) {
   constexpr const char* kEffect = "simulated/planned-effect.csv";
   constexpr const char* kNone = "simulated/no-effect.csv";
-  const PlannedStudies studies(made.protocol, made.plan.model, made.participants, made.seed);
+  const std::unique_ptr<PlannedStudies> studies = planned_studies(made);
   const std::string scratch = draft / "scratch";
-  studies.write(scratch, draft.prepare(kEffect), draft / "codebook.csv", true, made.typical_time);
+  studies->write(scratch, draft.prepare(kEffect), draft / "codebook.csv", true);
   fs::remove_all(scratch);
-  studies.write(scratch, draft.prepare(kNone), "", false, made.typical_time);
+  studies->write(scratch, draft.prepare(kNone), "", false);
   fs::remove_all(scratch);
   write_member(draft, "simulated/README.md",
-               "# SIMULATED data\n\nDrawn from the model of plan.json, in the registered orders of "
-               "trials: no person took part. `planned-effect.csv` has the effects that the study "
-               "is to find, `no-effect.csv` none. `../codebook.csv` explains the columns.\n");
-  const analysis::TrialTable first = read_table(draft, kEffect);
-  const std::string with = analyzed(first, made.too_fast);
-  const std::string none = analyzed(read_table(draft, kNone), made.too_fast);
+               "# SIMULATED data\n\n" + study_answers(made)->simulated() + "\n");
+  const std::string with = studies->analyzed(draft / kEffect, kEffect);
+  const std::string none = studies->analyzed(draft / kNone, kNone);
   write_member(draft, "analysis-simulated.json",
                nlohmann::ordered_json{{"planned_effect", read_ordered_json(with)},
                                       {"no_effect", read_ordered_json(none)}}
@@ -492,8 +243,8 @@ void put_simulated(const RegisterOptions& options, const data::AtomicFolder& dra
   made.hypotheses = analysis::read_hypotheses(made.hypotheses_text, options.hypotheses,
                                               analysis::named_results(with, made.alpha));
   ProgressLine line("simulated studies");
-  made.rehearsals = studies.rehearse(first, made, options.studies, options.jobs,
-                                     [&](double share) { line.show(share); });
+  made.rehearsals = rehearse(*studies, made, options.studies.value_or(usual_studies(made.protocol)),
+                             options.jobs, [&](double share) { line.show(share); });
   line.clear();
 }
 
@@ -538,11 +289,11 @@ int register_command(const std::vector<std::string>& args) {
   made.too_fast = options.too_fast;
   made.alpha = made.plan.alpha;
   made.seed = options.seed;
-  made.typical_time = PlannedStudies::typical_time(made.protocol, made.too_fast);
+  made.typical_time = typical_time(made.protocol, made.too_fast);
   made.participant_version = participants::kDefaultParticipantVersion;
   made.participant_sha256 = participants::load_simulated_settings("").sha256;
   for (std::size_t p = 1; p <= made.participants; ++p)
-    made.order_sha256.push_back(order_checksum(order_of(made.protocol, static_cast<int>(p))));
+    made.order_sha256.push_back(order_checksum(made.protocol, static_cast<int>(p)));
 
   data::AtomicFolder draft(options.out);
   put_simulated(options, draft, made);

@@ -1,7 +1,6 @@
 #include "runner/commands/register/registration.h"
 
 #include <algorithm>
-#include <array>
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
@@ -13,8 +12,10 @@
 #include "data/files/utc.h"
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
+#include "protocols/tasks/task_plan.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/sealed_folder.h"
+#include "runner/commands/shared/study_order.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -221,35 +222,6 @@ std::vector<std::string> contradictions_of(const Registration& read, const State
 
 }  // namespace
 
-std::string to_line(const OrderRow& row) {
-  std::string line = std::to_string(row.session) + "," + row.renderer + "," + row.shape;
-  for (const double part : row.orientation_wxyz) {
-    std::array<char, 40> digits{};
-    const int length = std::snprintf(digits.data(), digits.size(), ",%.17g", part + 0.0);
-    line.append(digits.data(), static_cast<std::size_t>(length));
-  }
-  return line;
-}
-
-std::vector<OrderRow> order_of(const protocols::Protocol& protocol, int participant_number) {
-  std::vector<OrderRow> rows;
-  for (const protocols::Trial& trial : protocols::schedule(protocol, participant_number)) {
-    if (trial.practice) continue;
-    const Quat& q = trial.orientation;
-    rows.push_back({trial.session,
-                    protocols::to_string(trial.renderer),
-                    protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name,
-                    {q.w, q.x, q.y, q.z}});
-  }
-  return rows;
-}
-
-std::string order_checksum(const std::vector<OrderRow>& rows) {
-  std::string lines;
-  for (const OrderRow& row : rows) lines += to_line(row) + "\n";
-  return checksum_hex(lines);
-}
-
 void VerdictCounts::add(analysis::Verdict verdict) {
   corroborated += verdict == analysis::Verdict::corroborated;
   refuted += verdict == analysis::Verdict::refuted;
@@ -276,7 +248,7 @@ std::string registration_json(const Registration& registration) {
     out["protocol"]["files"].push_back({{"file", file.name}, {"sha256", checksum_hex(file.bytes)}});
   out["plan"] = {{"file", "plan.json"}, {"sha256", checksum_hex(registration.plan_text)}};
   out["participants"] = registration.participants;
-  out["trials_per_participant"] = protocols::main_trials(protocol);
+  out["trials_per_participant"] = planned_trials(protocol);
   out["analysis"] = {{"too_fast_s", registration.too_fast}, {"alpha", registration.alpha}};
   out["orders"] = Json::array();
   for (std::size_t i = 0; i < registration.order_sha256.size(); ++i)
@@ -368,11 +340,10 @@ Registration read_registration(const std::string& folder) {
 }
 
 void require_registrable(const protocols::Protocol& protocol, const std::string& path) {
-  if (protocol.version != 1)
-    throw UsageError(path +
-                     ": /version: expected a protocol of version 1: hypotheses on the results of "
-                     "tasks cannot be registered yet");
-  if (protocol.renderers.size() != 2)
+  if (protocols::is_external(protocol))
+    throw UsageError(path + ": /blocks: expected blocks whose trials the protocol determines: " +
+                     "another program chooses those of a block 'external'");
+  if (protocol.blocks.empty() && protocol.renderers.size() != 2)
     throw UsageError(path + ": /renderers: expected two renderers to compare, point and ray");
 }
 

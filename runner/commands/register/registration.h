@@ -2,7 +2,6 @@
 // A registration: a lab's statement about its study before the first session. A folder of files
 // that 'palpate register' makes and 'palpate check' reads.
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -10,26 +9,12 @@
 #include <vector>
 
 #include "analysis/report/hypotheses.h"
-#include "analysis/report/plan_report.h"
+#include "analysis/report/plan_record.h"
 #include "data/record.h"
 #include "protocols/protocol.h"
-#include "protocols/schedule.h"
 #include "runner/commands/register/form.h"
 
 namespace palpate::runner::commands {
-
-/// The trials for analysis of a participant, a line each: "session,renderer,shape,w,x,y,z" with 17
-/// significant digits. Practice is left out, as its rounds depend on answers.
-struct OrderRow {
-  int session = 1;
-  std::string renderer, shape;
-  std::array<double, 4> orientation_wxyz{};
-  bool operator==(const OrderRow&) const = default;
-};
-std::string to_line(const OrderRow& row);
-std::vector<OrderRow> order_of(const protocols::Protocol& protocol, int participant_number);
-/// SHA-256 of the lines, each with a line feed.
-std::string order_checksum(const std::vector<OrderRow>& rows);
 
 /// Counts of a hypothesis' verdicts in simulated studies.
 struct VerdictCounts {
@@ -56,13 +41,14 @@ struct Registration {
   std::string hypotheses_text;  ///< hypotheses.json, byte for byte
   std::vector<analysis::Hypothesis> hypotheses;
   std::size_t participants = 0;
-  double too_fast = 0.2, alpha = 0.05;         ///< s; of the tests
-  std::vector<std::string> order_sha256;       ///< of participant number 1, 2, ...
-  int participant_version = 0;                 ///< default of the simulated participant
-  std::string participant_sha256;              ///< its settings
-  std::vector<Rehearsal> rehearsals;           ///< one for each hypothesis
-  std::uint64_t seed = 1;                      ///< of the simulated studies
-  double typical_time = 0;                     ///< s, of the simulated studies
+  double too_fast = 0.2, alpha = 0.05;    ///< s; of the tests
+  std::vector<std::string> order_sha256;  ///< of participant number 1, 2, ...
+  int participant_version = 0;            ///< default of the simulated participant
+  std::string participant_sha256;         ///< its settings
+  std::vector<Rehearsal> rehearsals;      ///< one for each hypothesis
+  std::uint64_t seed = 1;                 ///< of the simulated studies
+  /// s, of the simulated studies; 0: nothing is identified.
+  double typical_time = 0;
   std::optional<std::size_t> sessions_so_far;  ///< in the named database; none: no database
   std::vector<std::string> warnings;
   std::vector<std::string> sha256_when_made;  ///< of version 1: of files_to_fill_in()
@@ -101,7 +87,7 @@ Registration read_registration(const std::string& folder);
 /// What registration.json itself says, without the other files. \throws InputError with every fault
 Registration parse_statement(const std::string& text, const std::string& file);
 
-/// Requires version 1 and two renderers. \throws UsageError
+/// Requires tasks whose trials palpate chooses, or two renderers to compare. \throws UsageError
 void require_registrable(const protocols::Protocol& protocol, const std::string& path);
 
 /// Requires that all names of a protocol's files lead below its folder. \throws UsageError

@@ -60,9 +60,11 @@ void require_one_protocol(const analysis::TaskTable& table, const std::string& w
 }  // namespace
 
 analysis::TaskTable read_study_tasks(const std::string& database, const std::string& csv,
-                                     const std::string& protocol) {
-  analysis::TaskTable table = csv.empty() ? analysis::read_task_trials_store(database, protocol)
-                                          : analysis::read_task_trials_csv(csv, protocol);
+                                     const std::string& protocol,
+                                     const std::vector<analysis::ProtocolText>& protocols) {
+  analysis::TaskTable table = csv.empty()
+                                  ? analysis::read_task_trials_store(database, protocol)
+                                  : analysis::read_task_trials_csv(csv, protocol, protocols);
   require_one_protocol(table, protocol);
   return table;
 }

@@ -2,6 +2,7 @@
 // The trials of a study for its analysis, from a database or a table.
 
 #include <string>
+#include <vector>
 
 #include "analysis/input/task_trials.h"
 #include "analysis/input/trials.h"
@@ -18,8 +19,10 @@ analysis::TrialTable read_study_trials(const std::string& database, const std::s
 /// data.
 bool is_of_tasks(const std::string& database, const std::string& csv, const std::string& protocol);
 
-/// The trials of a study of version 2, as above. \throws UsageError: they are of several protocols
+/// The trials of a study of version 2, as above. \param protocols  of a table's trials, if known
+/// \throws UsageError: they are of several protocols
 analysis::TaskTable read_study_tasks(const std::string& database, const std::string& csv,
-                                     const std::string& protocol);
+                                     const std::string& protocol,
+                                     const std::vector<analysis::ProtocolText>& protocols = {});
 
 }  // namespace palpate::runner::commands

@@ -11,11 +11,69 @@
 #include <string>
 #include <vector>
 
+#include "analysis/report/plan_record.h"
 #include "analysis/statistics/plan.h"
+#include "analysis/statistics/threshold_plan.h"
+#include "protocols/json_document.h"
 
 namespace palpate::analysis {
 namespace {
 namespace plan_report {
+
+/// Of each measure, as a plan that was made by hand.
+ThresholdPlan a_plan_of(PlannedMeasure measure) {
+  ThresholdPlan plan;
+  plan.study.measure = measure;
+  plan.study.effect = -0.25;
+  plan.study.participant_sd = 0.75;
+  plan.settings.trials = {42, 84};
+  plan.settings.participants = {6, 12};
+  plan.settings.studies = 100;
+  for (const std::size_t trials : {42U, 84U}) {
+    for (const std::size_t n : {6U, 12U}) {
+      ThresholdPower& power = plan.powers.emplace_back();
+      power.trials = trials;
+      power.participants = n;
+      power.studies = 100;
+      power.power = trials == 84 && n == 12 ? 0.9 : 0.25;
+    }
+  }
+  return plan;
+}
+
+TEST(PlanRecordTest, KeepsEachMeasure) {
+  for (const PlannedMeasure measure :
+       {PlannedMeasure::jnd, PlannedMeasure::pse, PlannedMeasure::threshold,
+        PlannedMeasure::accuracy, PlannedMeasure::rating, PlannedMeasure::exponent}) {
+    ThresholdPlan plan = a_plan_of(measure);
+    if (measure == PlannedMeasure::rating) plan.study.bound = 0.5;
+    const PlanRecord read = read_plan(threshold_plan_json(plan), "plan.json");
+    ASSERT_NE(read.measure(), nullptr);
+    EXPECT_EQ(read.times(), nullptr);
+    EXPECT_EQ(read.measure()->measure, measure);
+    EXPECT_EQ(read.measure()->effect, -0.25);
+    EXPECT_EQ(read.measure()->participant_sd, 0.75);
+    EXPECT_EQ(read.measure()->bound, plan.study.bound);
+    ASSERT_NE(read.curve_for(84), nullptr);
+    EXPECT_EQ(read.curve_for(84)->participants, 12U);
+    EXPECT_EQ(read.curve_for(84)->power.at(6), 0.25);
+    EXPECT_FALSE(read.curve_for(42)->participants);
+    EXPECT_EQ(read.curve_for(43), nullptr);
+  }
+}
+
+TEST(PlanRecordTest, NamesEveryFault) {
+  auto json = nlohmann::json::parse(threshold_plan_json(a_plan_of(PlannedMeasure::jnd)));
+  json["model"]["measure"] = "weight";
+  json["model"]["lapse"] = 2;
+  json["settings"]["alpha"] = 0;
+  try {
+    read_plan(json.dump(), "plan.json");
+    FAIL() << "nothing is refused";
+  } catch (const protocols::InputError& error) {
+    EXPECT_EQ(error.faults().size(), 3U);
+  }
+}
 
 PlanPoint point_of(std::size_t participants, std::size_t trials, std::vector<std::size_t> found,
                    std::size_t all, std::size_t any) {

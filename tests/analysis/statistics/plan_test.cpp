@@ -14,6 +14,7 @@
 
 #include "analysis/figures/svg.h"
 #include "analysis/input/trials.h"
+#include "analysis/report/plan_record.h"
 #include "analysis/report/plan_report.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/power.h"

@@ -189,9 +189,9 @@ class Register(Study):
         self.write("three.json", one | {"stimuli": one["stimuli"][:3],
                                         "response": {"keys": {"1": "sphere", "2": "cone", "3": "cylinder"}}})
         for words, files in (("did you mean", {"hypotheses": bad_name}), ("/0/text", {"hypotheses": wrong}),
-                             ("a plan of times", {"plan": "jnd.json"}), ("--trials 3", {"plan": "other.json"}),
+                             ("'palpate plan --json'", {"plan": "jnd.json"}), ("--trials 3", {"plan": "other.json"}),
                              ("two renderers", {"protocol": "one.json"}), ("protocol's shapes", {"protocol": "three.json"}),
-                             ("version 1", {"protocol": SOURCE / "protocols/stiffness-2afc.json"})):
+                             ("expected a plan of a measure that the protocol gives", {"protocol": SOURCE / "protocols/stiffness-2afc.json"})):
             done = self.register(status=2, **files)
             self.assertIn(words, done.stderr, files)
             self.assertEqual(done.stdout, "")

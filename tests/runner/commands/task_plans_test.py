@@ -26,13 +26,16 @@ class TaskPlans(CommandCase):
         out = self.dir / name
         said = self.palpate("plan", *more, "--studies", 100, "--json", out, "--force").stdout
         self.assertIn("SIMULATED STUDIES", said)
-        found = json.loads(out.read_text())["powers"]
+        plan = json.loads(out.read_text())
+        self.assertEqual([one["trials_per_cell"] for one in plan["needed"]],
+                         [one["trials_per_cell"] for one in plan["curves"]])
+        found = [point for curve in plan["curves"] for point in curve["points"]]
         for one in found:
             low, high = one["power_ci95"]
             self.assertLessEqual(low, one["power"])
             self.assertGreaterEqual(high, one["power"])
             self.assertEqual(one["studies"], 100)
-        return {(one["trials"], one["participants"]): one for one in found}
+        return {(one["trials_per_cell"], one["participants"]): one for one in found}
 
     def test_power_for_a_difference_of_jnds_grows_with_participants(self):
         arguments = "--jnd-effect", 50, "--trials", "84", "--participants", "4-8"
@@ -47,6 +50,9 @@ class TaskPlans(CommandCase):
         self.assertEqual(found["n_not_determined"], 0)
         found = self.powers("--rating-effect", 0, "--equivalence", 2, "--trials", "4", "--participants", "12-12")[4, 12]
         self.assertGreater(found["power"], 0.8)
+        found = self.powers("--exponent-effect", 40, "--trials", "28", "--participants", "8-12")
+        self.assertGreater(found[28, 12]["power"], 0.9)
+        self.assertLess(abs(found[28, 12]["bias"]), 0.1)
         found = self.powers("--pse-effect", 0, "--trials", "42", "--participants", "6-6")[42, 6]
         self.assertLessEqual(found["power"], 0.12)  # 0.05, apart from the error of 100 studies
 
