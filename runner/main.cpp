@@ -108,9 +108,9 @@ const Command& command_named(const std::string& name) {
   }
   constexpr std::size_t kLongest = 40;  // of what may be a misspelt command
   const std::string meant = name.size() > kLongest ? "" : palpate::nearest_word(name, names);
-  throw palpate::runner::commands::UsageError(
-      "no command '" + name + "'; " + (meant.empty() ? "" : "did you mean '" + meant + "'? ") +
-      "'palpate --help' lists them");
+  throw palpate::runner::UsageError("no command '" + name + "'; " +
+                                    (meant.empty() ? "" : "did you mean '" + meant + "'? ") +
+                                    "'palpate --help' lists them");
 }
 
 int run(int argc, char** argv) {
@@ -145,7 +145,7 @@ int main(int argc, char** argv) {
     if (!std::cout)
       throw std::runtime_error("standard output could not be written (disk full or pipe closed)");
     return status;
-  } catch (const palpate::runner::commands::UsageError& error) {
+  } catch (const palpate::runner::UsageError& error) {
     std::cerr << "palpate: " << palpate::printable_lines(error.what()) << "\n";
     return 2;
   } catch (const palpate::protocols::InputError& error) {

@@ -22,13 +22,13 @@
 #include "data/base/text.h"
 #include "data/stored_protocol.h"
 #include "protocols/json_document.h"
-#include "runner/commands/bundle/contents.h"
 #include "runner/commands/movement/movement_study.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/outputs.h"
-#include "runner/commands/shared/study_analysis.h"
-#include "runner/commands/shared/study_trials.h"
 #include "runner/commands/sweep/planned.h"
+#include "runner/output/outputs.h"
+#include "runner/registration/bundle_contents.h"
+#include "runner/study/study_analysis.h"
+#include "runner/study/study_trials.h"
 
 namespace palpate::runner::commands {
 
@@ -52,7 +52,7 @@ void check(const boost::program_options::variables_map& values,
   }
 }
 
-void put(Outputs& outputs, const analysis::Analysis& analysis,
+void put(output::Outputs& outputs, const analysis::Analysis& analysis,
          const analysis::StudyRecord& record) {
   if (outputs.wanted("figures")) {
     for (const analysis::Figure& figure : analysis::figures_of(analysis, record)) {
@@ -93,7 +93,8 @@ std::vector<analysis::ProtocolText> protocols_in(const std::string& file) {
   if (file.empty()) return {};
   const std::string text = protocols::read_text_file(file);
   const nlohmann::json json = json_or_discarded(text);
-  if (json.is_object() && json.contains("protocols")) return parse_record(text, file).protocols;
+  if (json.is_object() && json.contains("protocols"))
+    return registration::parse_record(text, file).protocols;
   const data::StoredProtocol stored = data::read_stored_protocol(text);
   if (!json.is_object() || !json.contains("blocks"))
     throw UsageError(printable(file) +
@@ -105,14 +106,14 @@ std::vector<analysis::ProtocolText> protocols_in(const std::string& file) {
 void analyze_tasks_of(const std::string& database, const std::string& csv,
                       const std::string& protocol, const std::string& design,
                       const analysis::AnalysisSettings& settings,
-                      const analysis::FunctionSettings& functions, Outputs& outputs) {
-  const analysis::TaskAnalysis found =
-      analysis::analyze_tasks(read_study_tasks(database, csv, protocol, protocols_in(design)),
-                              functions, settings, PALPATE_VERSION);
+                      const analysis::FunctionSettings& functions, output::Outputs& outputs) {
+  const analysis::TaskAnalysis found = analysis::analyze_tasks(
+      study::read_study_tasks(database, csv, protocol, protocols_in(design)), functions, settings,
+      PALPATE_VERSION);
   if (outputs.wanted("json")) outputs.put("json", task_report_json(found, PALPATE_VERSION));
   if (outputs.wanted("report")) outputs.put("report", task_report_html(found, PALPATE_VERSION));
   if (outputs.wanted("figures")) {
-    for (const analysis::Figure& figure : figures_of(StudyAnalysis(found), {}))
+    for (const analysis::Figure& figure : study::figures_of(study::StudyAnalysis(found), {}))
       outputs.put_into_folder(figure.id + ".svg",
                               analysis::figure_svg(figure, analysis::light_palette()));
   }
@@ -153,7 +154,7 @@ void require_measures(const analysis::MovementTable& table, const std::string& d
                      reasons + ")");
 }
 
-void analyze_movement_of(MovementRequest request, Outputs& outputs) {
+void analyze_movement_of(MovementRequest request, output::Outputs& outputs) {
   request.pictures = outputs.wanted("report") || outputs.wanted("figures");
   MovementStudy study = measure_study(request);
   require_samples(study, request.database);
@@ -253,7 +254,8 @@ int analyze_command(const std::vector<std::string>& args) {
   check(*values, settings, line.usage);
   check_movement(*values, movement.settings.cutoff, movement.jobs);
   const analysis::FunctionSettings functions = function_settings(*values, function, scale);
-  Outputs outputs(*values, {"json", "report", "movement-csv"}, {"db", "csv", "sweep"}, "figures");
+  output::Outputs outputs(*values, {"json", "report", "movement-csv"}, {"db", "csv", "sweep"},
+                          "figures");
   if (values->count("sweep")) {
     if (!(*values)["function"].defaulted() || values->count("scale"))
       throw UsageError("--function, --scale: a sweep's points have their figures already");
@@ -269,15 +271,15 @@ int analyze_command(const std::vector<std::string>& args) {
     analyze_movement_of(movement, outputs);
     return 0;
   }
-  if (!design.empty() || is_of_tasks(database, csv, protocol)) {
+  if (!design.empty() || study::is_of_tasks(database, csv, protocol)) {
     analyze_tasks_of(database, csv, protocol, design, settings, functions, outputs);
     return 0;
   }
 
   if (!(*values)["function"].defaulted() || values->count("scale"))
     throw UsageError("--function, --scale: there are no tasks with psychometric functions");
-  const analysis::Analysis analysis =
-      analysis::analyze(read_study_trials(database, csv, protocol), settings, PALPATE_VERSION);
+  const analysis::Analysis analysis = analysis::analyze(
+      study::read_study_trials(database, csv, protocol), settings, PALPATE_VERSION);
   analysis::StudyRecord record;
   if (!database.empty() && (values->count("report") || values->count("figures"))) {
     record = analysis::read_study_record(database, protocol);

@@ -19,9 +19,9 @@
 
 #include "data/base/random.h"
 #include "rendering/renderer.h"
-#include "runner/bench/tick_meters.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/outputs.h"
+#include "runner/evidence/tick_meters.h"
+#include "runner/output/outputs.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/primitives.h"
 
@@ -68,11 +68,11 @@ class TickTimer {
  public:
   static constexpr double kTick = 1e-3;  ///< s
 
-  TickTimer() : ns_(bench::nanoseconds_per_count()) {
+  TickTimer() : ns_(evidence::nanoseconds_per_count()) {
     std::vector<std::uint64_t> empty(100'000);
     for (auto& count : empty) {
-      const std::uint64_t start = bench::begin_count();
-      count = bench::end_count() - start;
+      const std::uint64_t start = evidence::begin_count();
+      count = evidence::end_count() - start;
     }
     empty_ns_ = at(empty, 0.5);
   }
@@ -81,11 +81,11 @@ class TickTimer {
   rendering::Rendering tick(const rendering::Renderer& renderer, const rendering::Scene& scene,
                             rendering::RenderState& state, const rendering::LineProbe& probe,
                             bool touching_wanted) {
-    const std::uint64_t allocated = bench::allocations();
-    const std::uint64_t start = bench::begin_count();
+    const std::uint64_t allocated = evidence::allocations();
+    const std::uint64_t start = evidence::begin_count();
     rendering::Rendering rendering = renderer.tick(scene, state, probe, kTick);
-    const std::uint64_t count = bench::end_count() - start;
-    allocations_ += bench::allocations() - allocated;
+    const std::uint64_t count = evidence::end_count() - start;
+    allocations_ += evidence::allocations() - allocated;
     if ((rendering.contacts > 0) == touching_wanted) counts_.push_back(count);
     return rendering;
   }
@@ -648,7 +648,7 @@ int bench_command(const std::vector<std::string>& args) {
       ("force", "replace an existing file");
   const auto values = line.parse(args);
   if (!values) return 0;
-  Outputs outputs(*values, {"json"}, {});
+  output::Outputs outputs(*values, {"json"}, {});
   const long ticks = (*values)["ticks"].as<long>();
   if (ticks < 1000 || ticks > 100'000'000)
     throw UsageError("--ticks: must be 1000 to 100000000, not " + std::to_string(ticks));

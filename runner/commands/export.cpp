@@ -17,11 +17,12 @@
 #include "data/store/store.h"
 #include "data/store/sweep_file.h"
 #include "runner/commands/movement/movement_study.h"
-#include "runner/commands/movement/touched_trial.h"
-#include "runner/commands/shared/about_file.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/progress_line.h"
 #include "runner/commands/shared/protocol_choice.h"
+#include "runner/movement/touched_trial.h"
+#include "runner/output/progress_line.h"
+#include "runner/registration/about_file.h"
+#include "runner/study/export_settings.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -43,14 +44,14 @@ class MovementExport {
 
  private:
   data::Store& store_;
-  StudyStimuli stimuli_;
+  movement::StudyStimuli stimuli_;
   std::size_t not_rendered_ = 0;
   std::map<MovementStudy::TrialKey, data::DerivedMeasures::Values> measured_;
 };
 
 void MovementExport::add_contacts(data::ExportSettings& settings) {
   settings.contacts = [this](const data::StoredTrial& trial) {
-    auto contacts = contacts_of(*stimuli_.of(store_, trial), trial);
+    auto contacts = movement::contacts_of(*stimuli_.of(store_, trial), trial);
     if (contacts.empty() && !trial.record.samples.empty()) ++not_rendered_;
     return contacts;
   };
@@ -100,7 +101,7 @@ class Progress {
 
  private:
   const std::atomic<bool>& stop_asked_;
-  ProgressLine line_;
+  output::ProgressLine line_;
   double all_ = 0;
 };
 
@@ -216,15 +217,15 @@ Request request_of(const po::variables_map& values, const std::string& usage) {
 }
 
 data::ExportResult write_export(const Request& request) {
-  data::ExportSettings settings = export_settings();
-  if (!request.about.empty()) settings.about = read_about_file(request.about);
+  data::ExportSettings settings = study::export_settings();
+  if (!request.about.empty()) settings.about = registration::read_about_file(request.about);
   data::Store store = data::Store::open(request.database, data::Store::Mode::read_for_export);
   warn_of_exposure(request.database);
   settings.force = request.force;
   settings.pages = request.pages;
   settings.times = request.times;
   settings.codebook = request.codebook;
-  Progress progress(store, catch_stop_signals());
+  Progress progress(store, output::catch_stop_signals());
   settings.progress = [&](std::int64_t trials) { progress.show(trials); };
   settings.motion = request.motion;
   MovementExport hand(store, request.meshes);
@@ -272,8 +273,8 @@ void export_sweep(const Request& request, bool times_given) {
                      "--times, --codebook and --pages");
   }
   data::SweepFile sweep = data::SweepFile::open(request.database);
-  const std::atomic<bool>& stop_asked = catch_stop_signals();
-  ProgressLine line("export");
+  const std::atomic<bool>& stop_asked = output::catch_stop_signals();
+  output::ProgressLine line("export");
   const auto all = static_cast<double>(std::max<std::int64_t>(1, sweep.count()));
   const std::int64_t points =
       data::export_sweep_csv(sweep, request.out, request.force, [&](std::int64_t done) {

@@ -10,7 +10,7 @@
 
 #include "data/base/text.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/progress_line.h"
+#include "runner/output/progress_line.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -60,7 +60,7 @@ bool are_sweeps(const std::vector<std::string>& inputs) {
 
 void merge_shards(const std::string& out, const std::vector<std::string>& inputs,
                   const std::atomic<bool>& stop_asked) {
-  ProgressLine progress("files");
+  output::ProgressLine progress("files");
   const data::SweepMergeResult done = data::merge_sweeps(out, inputs, [&](std::int64_t file) {
     if (stop_asked) throw std::runtime_error("stopped; nothing was written");
     progress.show(static_cast<double>(file) / static_cast<double>(inputs.size()));
@@ -108,7 +108,7 @@ int merge_command(const std::vector<std::string>& args) {
     throw UsageError("missing the databases to merge\nUsage: " + line.usage + "\nMore: add --help");
   }
   refuse_folders(inputs);
-  const std::atomic<bool>& stop_asked = catch_stop_signals();
+  const std::atomic<bool>& stop_asked = output::catch_stop_signals();
   try {
     if (are_sweeps(inputs)) {
       if ((*values)["renumber"].as<bool>())
@@ -116,7 +116,7 @@ int merge_command(const std::vector<std::string>& args) {
       merge_shards(out, inputs, stop_asked);
       return 0;
     }
-    ProgressLine progress("sessions");
+    output::ProgressLine progress("sessions");
     const data::MergeResult done = data::merge(
         out, inputs,
         [&](std::int64_t session, std::int64_t all) {

@@ -9,9 +9,9 @@
 
 #include "protocols/parse.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/outputs.h"
-#include "runner/commands/shared/study_order.h"
-#include "runner/commands/shared/task_words.h"
+#include "runner/output/outputs.h"
+#include "runner/study/study_order.h"
+#include "runner/study/task_words.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -24,8 +24,9 @@ const std::string& shape_of(const protocols::Protocol& protocol, const protocols
 
 void print_csv(const protocols::Protocol& protocol, const std::vector<protocols::Trial>& trials,
                int participant) {
-  CsvText table(schedule_columns(), "\r\n");
-  for (const protocols::Trial& trial : trials) put_scheduled(table, protocol, trial, participant);
+  output::CsvText table(study::schedule_columns(), "\r\n");
+  for (const protocols::Trial& trial : trials)
+    study::put_scheduled(table, protocol, trial, participant);
   std::cout << table.text();
 }
 
@@ -106,19 +107,20 @@ int schedule_command(const std::vector<std::string>& args) {
     if (format == "order") throw UsageError("--recover: is no order; expected table, csv or json");
     const int count = (*values)["recover"].as<int>();
     if (count < 2 || count > 100000) throw UsageError("--recover: must be 2 to 100000");
-    std::cout << recovery_text(protocol, count, (*values)["seed"].as<std::uint64_t>(), format);
+    std::cout << study::recovery_text(protocol, count, (*values)["seed"].as<std::uint64_t>(),
+                                      format);
     return 0;
   }
   if (values->count("participant") == 0)
     throw UsageError("expected --participant N\nUsage: " + line.usage + "\nMore: add --help");
   const int participant = (*values)["participant"].as<int>();
-  check_participant_number(participant);
+  study::check_participant_number(participant);
   if (format == "order") {
-    std::cout << fixed_order(protocol, participant);
+    std::cout << study::fixed_order(protocol, participant);
     return 0;
   }
   if (protocol.version == 2) {
-    std::cout << task_schedule_text(protocol, participant, format);
+    std::cout << study::task_schedule_text(protocol, participant, format);
     return 0;
   }
   const std::vector<protocols::Trial> trials = protocols::schedule(protocol, participant);

@@ -19,9 +19,10 @@
 #include "protocols/parse.h"
 #include "protocols/tasks/levels.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/progress_line.h"
 #include "runner/commands/shared/study_options.h"
+#include "runner/output/progress_line.h"
 #include "runner/session/simulated_study.h"
+#include "runner/study/simulation_limits.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -176,7 +177,7 @@ int simulate_command(const std::vector<std::string>& args) {
   const participants::SimulatedSettings simulated =
       participants::load_simulated_settings(options.patch, version);
   // Check before creating a database, so that a refusal leaves none behind.
-  const session::LimitedForSimulation limited = fit_to_simulation(protocol, simulated);
+  const session::LimitedForSimulation limited = study::fit_to_simulation(protocol, simulated);
   for (const std::string& text : limited.texts)
     std::fprintf(stderr, "%s\n", printable(text).c_str());
   plan.event = limited.event;
@@ -184,9 +185,9 @@ int simulate_command(const std::vector<std::string>& args) {
   warn_of_exposure(store->path());
 
   const auto start = std::chrono::steady_clock::now();
-  ProgressLine line("trials");
+  output::ProgressLine line("trials");
   const session::StudyProgress progress = session::simulate_study(
-      protocol, *store, simulated, plan, catch_stop_signals(),
+      protocol, *store, simulated, plan, output::catch_stop_signals(),
       [&line](const session::StudyProgress& p) {
         line.show(static_cast<double>(p.recorded) / static_cast<double>(p.expected));
       });

@@ -12,16 +12,16 @@
 #include "protocols/parse.h"
 #include "protocols/schedule.h"
 #include "protocols/tasks/texts.h"
-#include "runner/commands/render/forces.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/scene_notes.h"
-#include "runner/commands/shared/task_words.h"
 #include "runner/devices/device_delay.h"
 #include "runner/devices/registry.h"
 #include "runner/devices/simulated.h"
 #include "runner/serve/served_scene.h"
 #include "runner/session/device_check.h"
 #include "runner/session/simulated_study.h"
+#include "runner/study/task_words.h"
+#include "runner/touch/forces.h"
+#include "runner/touch/scene_notes.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/primitives.h"
@@ -113,14 +113,15 @@ void print_task_summary(const protocols::Protocol& protocol, std::ostream& out) 
   for (const protocols::TaskBlock& block : protocol.blocks) {
     trials += protocols::most_trials_of(block);
     out << "    " << block.name << "\n";
-    for (const std::string& line : in_words(protocol, block)) out << "      " << line << "\n";
+    for (const std::string& line : study::in_words(protocol, block))
+      out << "      " << line << "\n";
   }
   for (const protocols::PageSpec& page : protocol.pages) {
     constexpr std::array kPlaces = {"before the first block", "before block ", "after the last"};
     out << "  page        " << page.name << ", " << kPlaces[static_cast<std::size_t>(page.when)]
         << page.before_block << "\n";
   }
-  const std::vector<std::string> typed = keyboard_parts(protocol);
+  const std::vector<std::string> typed = study::keyboard_parts(protocol);
   if (!typed.empty())
     out << "  keyboard    needed beside a device's buttons for " << list(typed) << "\n";
   out << "  trials      at most " << trials << " for each participant\n"
@@ -249,10 +250,11 @@ void validate_scene(const std::string& text, const std::string& path, std::ostre
   for (std::size_t i = 0; i < spec.objects.size(); ++i)
     check_meshes(spec.objects[i], "/objects/" + std::to_string(i), path, builder, faults);
   if (!faults.empty()) throw protocols::InputError(faults);
-  build_scene(builder, path, spec, renderer_named("point"));
-  const rendering::Scene scene = build_scene(builder, path, spec, renderer_named("ray"));
+  touch::build_scene(builder, path, spec, touch::renderer_named("point"));
+  const rendering::Scene scene =
+      touch::build_scene(builder, path, spec, touch::renderer_named("ray"));
   out << printable(path) << "\n  objects     " << spec.objects.size() << "\n";
-  for (const std::string& note : scene_notes(spec, scene, builder))
+  for (const std::string& note : touch::scene_notes(spec, scene, builder))
     out << "  note        " << note << "\n";
   for (std::size_t i = 0; i < spec.objects.size(); ++i)
     print_overlaps(spec.objects[i], "/objects/" + std::to_string(i), builder, out);
@@ -326,14 +328,14 @@ int validate_command(const std::vector<std::string>& args) {
         << "  texts       built in, in English; a protocol in another language gives its own: "
         << list(built_in) << "\n";
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
-    for (const std::string& note : mesh_notes(stimulus.object, builder))
+    for (const std::string& note : touch::mesh_notes(stimulus.object, builder))
       std::cout << "  mesh        stimulus " << stimulus.name << ": " << note << "\n";
     print_overlaps(stimulus.object, "stimulus " + stimulus.name, builder, std::cout);
   }
   const StimulusLibrary library(protocol, std::move(builder));
   for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
     const rendering::SoftObject* const soft = library.soft(i);
-    const auto felt = soft != nullptr ? elements_felt(*soft) : std::nullopt;
+    const auto felt = soft != nullptr ? touch::elements_felt(*soft) : std::nullopt;
     if (felt)
       std::cout << "  note        stimulus " << protocol.stimuli[i].name << ": " << *felt << "\n";
   }

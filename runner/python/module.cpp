@@ -19,11 +19,12 @@
 #include "data/store/store.h"
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
-#include "runner/commands/render/forces.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/study_options.h"
-#include "runner/commands/shared/task_words.h"
 #include "runner/session/simulated_study.h"
+#include "runner/study/simulation_limits.h"
+#include "runner/study/task_words.h"
+#include "runner/touch/forces.h"
 #include "stimuli/convex_mesh.h"
 
 namespace palpate::runner {
@@ -66,7 +67,7 @@ py::dict arrays_of(const data::ColumnTable& table) {
 
 /// \param columns  t (s), tip and tail (m) and, with ten, the tool's +x, each of one length.
 /// \throws protocols::InputError naming what is wrong, as read_trajectory does of a file
-std::vector<commands::TimedPose> poses_of(const std::vector<Coordinates>& columns) {
+std::vector<touch::TimedPose> poses_of(const std::vector<Coordinates>& columns) {
   constexpr std::size_t kFaultsShown = 20;
   std::vector<protocols::Fault> faults;
   const py::ssize_t rows = columns.at(0).size();
@@ -77,15 +78,15 @@ std::vector<commands::TimedPose> poses_of(const std::vector<Coordinates>& column
   }
   if (rows == 0)
     throw protocols::InputError({{"trajectory", "(columns)", "expected at least one row"}});
-  std::vector<commands::TimedPose> poses;
+  std::vector<touch::TimedPose> poses;
   for (py::ssize_t i = 0; i < rows && faults.size() < kFaultsShown; ++i) {
     const auto at = [&](std::size_t column) { return columns[column].data()[i]; };
-    commands::TimedPose pose{at(0), {{at(1), at(2), at(3)}, {at(4), at(5), at(6)}}};
+    touch::TimedPose pose{at(0), {{at(1), at(2), at(3)}, {at(4), at(5), at(6)}}};
     if (columns.size() > 7) pose.side = {at(7), at(8), at(9)};
     pose.line = static_cast<std::size_t>(i);
-    if (const std::string fault = commands::fault_of(pose, poses); !fault.empty()) {
+    if (const std::string fault = touch::fault_of(pose, poses); !fault.empty()) {
       faults.push_back({"trajectory", "row " + std::to_string(i), fault});
-      if (poses.size() == commands::kMostPoses) break;
+      if (poses.size() == touch::kMostPoses) break;
     } else {
       poses.push_back(pose);
     }
@@ -126,11 +127,11 @@ py::tuple simulate(const Document& given, const std::string& settings_text, int 
   std::vector<std::string> limited;
   {
     const py::gil_scoped_release unlocked;
-    commands::check_simulated_participants(participants);
+    study::check_simulated_participants(participants);
     protocols::Protocol protocol = parse(given);
     const participants::SimulatedSettings settings =
         participants::read_simulated_settings(settings_text);
-    limited = commands::fit_to_simulation(protocol, settings).texts;
+    limited = study::fit_to_simulation(protocol, settings).texts;
     Interruption interruption;
     const std::atomic<bool> stop{false};  // an exception ends it
     session::simulate_in_memory(protocol, settings, participants, seed, stop,
@@ -153,41 +154,40 @@ py::tuple simulate(const Document& given, const std::string& settings_text, int 
   return py::make_tuple(arrays_of(trials.table()), limited);
 }
 
-py::dict render(const Document& given, const std::vector<commands::TimedPose>& poses,
+py::dict render(const Document& given, const std::vector<touch::TimedPose>& poses,
                 const std::string& renderer_name) {
   std::unique_ptr<data::ColumnTable> table;
   {
     const py::gil_scoped_release unlocked;
-    const rendering::Renderer& renderer = commands::renderer_named(renderer_name);
+    const rendering::Renderer& renderer = touch::renderer_named(renderer_name);
     const protocols::SceneSpec spec = protocols::parse_scene_text(given.text, given.file);
     SceneBuilder builder;
-    const rendering::Scene scene = commands::build_scene(builder, given.file, spec, renderer);
+    const rendering::Scene scene = touch::build_scene(builder, given.file, spec, renderer);
     const bool tool = scene.tool() != nullptr;
-    table = std::make_unique<data::ColumnTable>(commands::force_columns(tool));
+    table = std::make_unique<data::ColumnTable>(touch::force_columns(tool));
     Interruption interruption;
-    commands::render_along(
-        scene, spec, renderer, poses,
-        [&](const commands::TimedPose& pose, const rendering::Rendering& rendering,
-            const rendering::RenderState&) {
-          commands::put_forces(*table, pose.t, rendering, tool);
-          interruption.check();
-        });
+    touch::render_along(scene, spec, renderer, poses,
+                        [&](const touch::TimedPose& pose, const rendering::Rendering& rendering,
+                            const rendering::RenderState&) {
+                          touch::put_forces(*table, pose.t, rendering, tool);
+                          interruption.check();
+                        });
   }
   return arrays_of(*table);
 }
 
 py::dict schedule(const Document& given, int participant) {
-  commands::check_participant_number(participant);
+  study::check_participant_number(participant);
   const protocols::Protocol protocol = parse(given);
-  data::ColumnTable table(commands::schedule_columns());
+  data::ColumnTable table(study::schedule_columns());
   for (const protocols::Trial& trial : protocols::schedule(protocol, participant))
-    commands::put_scheduled(table, protocol, trial, participant);
+    study::put_scheduled(table, protocol, trial, participant);
   return arrays_of(table);
 }
 
 /// The program prints these with status 2; \return false: another kind
 bool is_bad_input(const std::exception& error) {
-  return dynamic_cast<const commands::UsageError*>(&error) != nullptr ||
+  return dynamic_cast<const UsageError*>(&error) != nullptr ||
          dynamic_cast<const protocols::InputError*>(&error) != nullptr ||
          dynamic_cast<const stimuli::MeshError*>(&error) != nullptr ||
          dynamic_cast<const data::StoreRefused*>(&error) != nullptr;
@@ -198,8 +198,7 @@ bool is_bad_input(const std::exception& error) {
 PYBIND11_MODULE(_palpate, module) {
   module.attr("__version__") = PALPATE_VERSION;
   module.attr("DEFAULT_VERSION") = participants::kDefaultParticipantVersion;
-  static const py::exception<commands::UsageError> input_error(module, "InputError",
-                                                               PyExc_ValueError);
+  static const py::exception<UsageError> input_error(module, "InputError", PyExc_ValueError);
   py::register_exception_translator([](std::exception_ptr thrown) {
     try {
       if (thrown) std::rethrow_exception(std::move(thrown));
@@ -221,7 +220,7 @@ PYBIND11_MODULE(_palpate, module) {
   module.def(
       "render_file",
       [](const Document& scene, const std::string& trajectory, const std::string& renderer) {
-        return render(scene, commands::read_trajectory(trajectory), renderer);
+        return render(scene, touch::read_trajectory(trajectory), renderer);
       },
       py::arg("scene"), py::arg("trajectory"), py::arg("renderer"));
   module.def("schedule", &schedule, py::arg("protocol"), py::arg("participant"));

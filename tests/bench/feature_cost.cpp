@@ -13,7 +13,7 @@
 
 #include "rendering/probes.h"
 #include "rendering/tick.h"
-#include "rendering/verification/random_solids.h"
+#include "runner/evidence/verification/random_solids.h"
 #include "stimuli/primitives.h"
 #include "tests/bench/least_tick.h"
 #include "tests/bench/measured_tick.h"
@@ -99,13 +99,13 @@ const rendering::Renderer& shipped(bool ray) {
 /// leads it: so the path is the same for both cases of a pair.
 std::vector<rendering::LineProbe> path_over(const rendering::Scene& scene, bool ray,
                                             std::size_t ticks) {
-  rendering::SurfaceStrokeSettings settings;
+  runner::evidence::SurfaceStrokeSettings settings;
   settings.centre = scene.parts()[0].sphere_centre;
   settings.radius = scene.parts()[0].sphere_radius;
   settings.side = ray;
   settings.lifted = 0.3;
   settings.lift_period = 250;
-  rendering::SurfaceStroke hand(settings);
+  runner::evidence::SurfaceStroke hand(settings);
   rendering::RenderState state = scene.initial_state();
   std::vector<rendering::LineProbe> poses;
   poses.reserve(ticks);

@@ -15,12 +15,12 @@
 #include <string>
 #include <vector>
 
-#include "rendering/accuracy/local_depths.h"
-#include "rendering/accuracy/methods.h"
 #include "rendering/renderer.h"
-#include "rendering/verification/random_solids.h"
-#include "rendering/verification/reference.h"
-#include "runner/bench/tick_meters.h"
+#include "runner/evidence/accuracy/local_depths.h"
+#include "runner/evidence/accuracy/methods.h"
+#include "runner/evidence/tick_meters.h"
+#include "runner/evidence/verification/random_solids.h"
+#include "runner/evidence/verification/reference.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::bench {
@@ -42,10 +42,10 @@ Path hand_over(const std::shared_ptr<const stimuli::ConvexMesh>& mesh, bool segm
       segment ? rendering::ray_renderer() : rendering::point_renderer();
   const rendering::Scene scene({{mesh, Pose{}, stimuli::Material{}, 0, nullptr}}, segment);
   rendering::RenderState state = scene.initial_state();
-  rendering::SurfaceStrokeSettings settings;
+  runner::evidence::SurfaceStrokeSettings settings;
   settings.side = segment;
   settings.lifted = 0.27;
-  rendering::SurfaceStroke hand(settings);
+  runner::evidence::SurfaceStroke hand(settings);
   Path path(kWarm + kTicks);
   double depth = 0;
   for (rendering::LineProbe& probe : path) {
@@ -74,8 +74,8 @@ double quantile(std::vector<std::uint64_t>& counts, double fraction) {
 /// Compares an estimate with the penetration depth. A method that keeps to its side may hold
 /// another local minimum, and is then compared with that one.
 void check(const stimuli::ConvexMesh& mesh, const rendering::LineProbe& probe,
-           const rendering::ReferenceDepth& exact, const rendering::ContactEstimate& estimate,
-           bool keeps_side, Row& row) {
+           const runner::evidence::ReferenceDepth& exact,
+           const runner::evidence::ContactEstimate& estimate, bool keeps_side, Row& row) {
   const double tolerance = kWrong * mesh.size();
   ++row.checked;
   if (std::isnan(estimate.depth)) {
@@ -87,8 +87,8 @@ void check(const stimuli::ConvexMesh& mesh, const rendering::LineProbe& probe,
   double error = std::abs(depth - std::max(0.0, exact.depth));
   if (error > kRounding * mesh.size() && keeps_side && estimate.touching) {
     const double to_least = error;
-    for (const rendering::LocalDepth& local :
-         rendering::local_depths(mesh, probe, estimate.normal, 1e-3))
+    for (const runner::evidence::LocalDepth& local :
+         runner::evidence::local_depths(mesh, probe, estimate.normal, 1e-3))
       error = std::min(error, std::abs(depth - local.depth));
     if (error < to_least) ++row.other_side;
   }
@@ -101,33 +101,33 @@ void check(const stimuli::ConvexMesh& mesh, const rendering::LineProbe& probe,
 /// The exact depths of every so many ticks of a path.
 struct ExactDepths {
   std::size_t every = 1;
-  std::map<std::size_t, rendering::ReferenceDepth> depths;
+  std::map<std::size_t, runner::evidence::ReferenceDepth> depths;
 
   ExactDepths(const stimuli::ConvexMesh& mesh, const Path& path) {
     const std::size_t size = mesh.facets().size() + mesh.edges().size();
     every = std::max<std::size_t>(1, kTicks * size / kCheckedVisits);
     for (std::size_t i = kWarm; i < path.size(); i += every)
-      depths.emplace(i, rendering::reference_depth(mesh, path[i]));
+      depths.emplace(i, runner::evidence::reference_depth(mesh, path[i]));
   }
 };
 
-Row run(const rendering::MethodDefinition& kind, const stimuli::ConvexMesh& mesh, const Path& path,
-        const ExactDepths& exact, bool segment, double seconds) {
-  const double ns = runner::bench::nanoseconds_per_count();
+Row run(const runner::evidence::MethodDefinition& kind, const stimuli::ConvexMesh& mesh,
+        const Path& path, const ExactDepths& exact, bool segment, double seconds) {
+  const double ns = runner::evidence::nanoseconds_per_count();
   const auto most = static_cast<std::uint64_t>(seconds * 1e9 / ns);
-  const std::unique_ptr<rendering::ContactMethod> method = kind.make(mesh, segment);
+  const std::unique_ptr<runner::evidence::ContactMethod> method = kind.make(mesh, segment);
   Row row;
   row.method = kind.name;
   std::vector<std::uint64_t> counts;
   counts.reserve(kTicks);
-  std::vector<rendering::ContactEstimate> estimates;
+  std::vector<runner::evidence::ContactEstimate> estimates;
   estimates.reserve(kTicks);
   std::uint64_t spent = 0;
   // A method with history must come in from outside; the others may begin anywhere.
   for (std::size_t i = kind.has_history ? 0 : kWarm - 1; i < path.size() && spent < most; ++i) {
-    const std::uint64_t start = runner::bench::begin_count();
-    const rendering::ContactEstimate estimate = method->tick(path[i]);
-    const std::uint64_t count = runner::bench::end_count() - start;
+    const std::uint64_t start = runner::evidence::begin_count();
+    const runner::evidence::ContactEstimate estimate = method->tick(path[i]);
+    const std::uint64_t count = runner::evidence::end_count() - start;
     if (i < kWarm) continue;
     spent += count;
     counts.push_back(count);
@@ -146,9 +146,9 @@ Row run(const rendering::MethodDefinition& kind, const stimuli::ConvexMesh& mesh
 }
 
 /// The shipped renderer, the simplest exact one, and each library found.
-std::vector<rendering::MethodDefinition> compared() {
-  std::vector<rendering::MethodDefinition> kinds;
-  for (rendering::MethodDefinition& kind : rendering::contact_methods()) {
+std::vector<runner::evidence::MethodDefinition> compared() {
+  std::vector<runner::evidence::MethodDefinition> kinds;
+  for (runner::evidence::MethodDefinition& kind : runner::evidence::contact_methods()) {
     if (!kind.name.starts_with("walk") && kind.name != "scan") kinds.push_back(std::move(kind));
   }
   return kinds;
@@ -186,7 +186,7 @@ void compare(bool segment, double seconds) {
     const Path path = hand_over(mesh, segment);
     const ExactDepths exact(*mesh, path);
     std::vector<Row> rows;
-    for (const rendering::MethodDefinition& kind : compared()) {
+    for (const runner::evidence::MethodDefinition& kind : compared()) {
       rows.push_back(run(kind, *mesh, path, exact, segment, seconds));
       rows.back().triangles = std::size_t{20} << (2 * level);
       if (level == 3) growth[kind.name][0] = rows.back().median_ns;
@@ -213,7 +213,7 @@ int main_with(int argc, char** argv) {
       "Icospheres of 30 mm radius, a hand at 0.1 m/s, 1 to 2 mm deep for 70 %% of the time, the "
       "same "
       "path for all.\nMethods:\n");
-  for (const rendering::MethodDefinition& kind : compared())
+  for (const runner::evidence::MethodDefinition& kind : compared())
     std::printf("  %-12s %s\n", kind.name.c_str(), kind.description.c_str());
   std::printf(
       "wrong: depth off by more than 1e-6 of the size from the exact one (every facet looked at), "

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "protocols/parse.h"
-#include "rendering/verification/random_solids.h"
+#include "runner/evidence/verification/random_solids.h"
 #include "runner/session/session.h"
 #include "tests/bench/unlogged_trial.h"
 
@@ -32,7 +32,7 @@ class Stroke final : public runner::servo::TickSource {
  public:
   Stroke(const rendering::Scene& scene, const rendering::Renderer& renderer, std::uint32_t ticks)
       : poses_(ticks + 1) {
-    rendering::SurfaceStroke hand{rendering::SurfaceStrokeSettings{}};
+    runner::evidence::SurfaceStroke hand{runner::evidence::SurfaceStrokeSettings{}};
     rendering::RenderState state = scene.initial_state();
     double depth = 0;
     for (rendering::LineProbe& pose : poses_) {

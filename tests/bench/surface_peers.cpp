@@ -25,8 +25,8 @@
 #include <vector>
 
 #include "rendering/renderer.h"
-#include "rendering/verification/random_solids.h"
-#include "runner/bench/tick_meters.h"
+#include "runner/evidence/tick_meters.h"
+#include "runner/evidence/verification/random_solids.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/primitives.h"
 
@@ -72,13 +72,13 @@ struct Row {
 /// \param answer  when the way meets the surface; NaN: at some time
 Row time_queries(const std::vector<Query>& queries,
                  const std::function<double(const Query&)>& answer) {
-  const double ns = runner::bench::nanoseconds_per_count();
+  const double ns = runner::evidence::nanoseconds_per_count();
   std::vector<std::uint64_t> counts;
   Row row;
   for (const Query& query : queries) {
-    const std::uint64_t start = runner::bench::begin_count();
+    const std::uint64_t start = runner::evidence::begin_count();
     const double time = answer(query);
-    counts.push_back(runner::bench::end_count() - start);
+    counts.push_back(runner::evidence::end_count() - start);
     const double off = std::abs(time - query.time) * glm::length(query.to - query.from);
     const bool met = !(time > 1), meets = query.time <= 1;
     row.wrong += met != meets || (meets && off > kWrong * 2 * kRadius) ? 1 : 0;
@@ -181,10 +181,10 @@ void compare(int subdivisions, std::size_t count) {
         segment ? rendering::ray_renderer() : rendering::point_renderer();
     const rendering::Scene scene({}, segment, {}, nullptr, {{surface, Pose{}, 0}});
     rendering::RenderState state = scene.initial_state();
-    rendering::SurfaceStrokeSettings settings;
+    runner::evidence::SurfaceStrokeSettings settings;
     settings.side = segment;
     settings.radius = surface->radius();
-    rendering::SurfaceStroke hand(settings);
+    runner::evidence::SurfaceStroke hand(settings);
     // Ways of the tip from the ideal to the virtual tool, or of the stylus from tip to tail; every
     // second one outside.
     std::vector<Query> queries;
@@ -192,9 +192,9 @@ void compare(int subdivisions, std::size_t count) {
     double depth = 0;
     while (queries.size() < count) {
       const rendering::LineProbe probe = hand.next(depth);
-      const std::uint64_t start = runner::bench::begin_count();
+      const std::uint64_t start = runner::evidence::begin_count();
       const rendering::Rendering r = renderer.tick(scene, state, probe, 1e-3);
-      const std::uint64_t cost = runner::bench::end_count() - start;
+      const std::uint64_t cost = runner::evidence::end_count() - start;
       depth = r.deepest.depth;
       if (r.contacts == 0) continue;
       ours.push_back(cost);
@@ -222,7 +222,7 @@ void compare(int subdivisions, std::size_t count) {
             return std::isnan(time) && query.time <= 1 ? query.time : time;
           }));
     std::sort(ours.begin(), ours.end());
-    const double ns = runner::bench::nanoseconds_per_count();
+    const double ns = runner::evidence::nanoseconds_per_count();
     std::printf("%-28s%9zu%10.2f%10.2f\n",
                 segment ? "palpate, a tick of the ray" : "palpate, a tick of the point",
                 ours.size(), static_cast<double>(ours[ours.size() / 2]) * ns / 1e3,

@@ -10,25 +10,25 @@
 #include "analysis/report/plan_record.h"
 #include "protocols/parse.h"
 #include "protocols/tasks/texts.h"
-#include "runner/commands/bundle/contents.h"
-#include "runner/commands/cluster/cluster_job.h"
-#include "runner/commands/register/registration.h"
-#include "runner/commands/shared/about_file.h"
 #include "runner/devices/device_delay.h"
 #include "runner/devices/falcon/calibration.h"
+#include "runner/registration/about_file.h"
+#include "runner/registration/bundle_contents.h"
+#include "runner/registration/registration.h"
+#include "runner/sweep/cluster_job.h"
 
 namespace {
 
-namespace commands = palpate::runner::commands;
+namespace registration = palpate::runner::registration;
 namespace devices = palpate::runner::devices;
 
 /// Reads a text, and again what is written of it.
 void try_form(const std::string& text) {
-  const commands::Form form = commands::read_form(text, "form.json");
-  if (commands::read_form(commands::form_json(form), "again.json") != form) std::abort();
-  const std::string made = commands::markdown_as_made(form, std::string(64, 'a'));
-  commands::markdown_changes(form, std::string(64, 'a'), made);
-  commands::osf_changes(form, std::string(64, 'a'), text);
+  const registration::Form form = registration::read_form(text, "form.json");
+  if (registration::read_form(registration::form_json(form), "again.json") != form) std::abort();
+  const std::string made = registration::markdown_as_made(form, std::string(64, 'a'));
+  registration::markdown_changes(form, std::string(64, 'a'), made);
+  registration::osf_changes(form, std::string(64, 'a'), text);
 }
 
 void try_plan(const std::string& text) {
@@ -38,8 +38,8 @@ void try_plan(const std::string& text) {
 }
 
 void try_statement(const std::string& text) {
-  const commands::Registration read = commands::parse_statement(text, "registration.json");
-  if (read.participants > commands::kMostParticipants ||
+  const registration::Registration read = registration::parse_statement(text, "registration.json");
+  if (read.participants > registration::kMostParticipants ||
       read.order_sha256.size() != read.participants || !(read.too_fast > 0 && read.alpha > 0))
     std::abort();
 }
@@ -68,11 +68,11 @@ const std::function<void(const std::string&)> kReaders[] = {
     try_delays,
     try_translation,
     [](const std::string& text) { palpate::analysis::read_hypotheses(text, "h.json", {}); },
-    [](const std::string& text) { commands::read_reported(text, "analysis.json"); },
-    [](const std::string& text) { commands::parse_record(text, "record.json"); },
-    [](const std::string& text) { commands::parse_points(text, "check.json"); },
-    [](const std::string& text) { commands::parse_job(text, "cluster.json"); },
-    [](const std::string& text) { commands::read_about_text(text, "about.json"); },
+    [](const std::string& text) { registration::read_reported(text, "analysis.json"); },
+    [](const std::string& text) { registration::parse_record(text, "record.json"); },
+    [](const std::string& text) { registration::parse_points(text, "check.json"); },
+    [](const std::string& text) { palpate::runner::sweep::parse_job(text, "cluster.json"); },
+    [](const std::string& text) { registration::read_about_text(text, "about.json"); },
     [](const std::string& text) { devices::falcon::parse_calibration(text, "lab.json"); },
 };
 

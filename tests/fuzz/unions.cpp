@@ -4,11 +4,12 @@
 #include <cstdlib>
 #include <iostream>
 
-#include "rendering/verification/search.h"
+#include "runner/evidence/verification/search.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
-  using namespace palpate::rendering;
-  const UnionCounts counts = search_union(ray_renderer(), grid_walk({data, size}, 300));
+  using namespace palpate::runner::evidence;
+  const UnionCounts counts =
+      search_union(palpate::rendering::ray_renderer(), grid_walk({data, size}, 300));
   if (counts.wrong() == 0) return 0;
   for (const SearchFault& fault : counts.faults) {
     std::cerr << "tick " << fault.tick << ": " << fault.what << "\n";

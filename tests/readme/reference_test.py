@@ -246,7 +246,7 @@ class Hypotheses(unittest.TestCase):
         self.assertEqual(told, defined)
 
     def test_points_of_a_check(self):
-        source = (ROOT / "runner/commands/check/deviations.cpp").read_text()
+        source = (ROOT / "runner/registration/deviations.cpp").read_text()
         made = set(re.findall(r'CheckPoint out\{\s*"([a-z]+)"', source)) | set(re.findall(r'left_out\(\s*"([a-z]+)"', source))
         told = {code for row in cells(PAGES["analysis/README.md"].section("Reference: points of a check"))
                 for code in codes(row[0])}

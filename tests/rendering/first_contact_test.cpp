@@ -107,11 +107,11 @@ void check_against_fine_steps(Bench& bench, const testing::ProbePath& local_path
     const LineProbe felt = bench.felt(probe);
     const stimuli::ConvexMesh& mesh = bench.mesh();
     const double tolerance = 1e-9 * mesh.size() + bench.rounding(probe);
-    const auto time =
-        was_free ? reference_first_contact(mesh, last, felt, 100) : std::optional<double>();
+    const auto time = was_free ? runner::evidence::reference_first_contact(mesh, last, felt, 100)
+                               : std::optional<double>();
     if (time) {
       ++tally.entered;
-      const double depth = reference_depth(mesh, felt).depth;
+      const double depth = runner::evidence::reference_depth(mesh, felt).depth;
       if (depth > tolerance) {
         ++tally.stayed;
         ASSERT_EQ(r.contacts, 1) << "tick " << i << ", depth " << depth << " of " << mesh.size();
@@ -120,19 +120,22 @@ void check_against_fine_steps(Bench& bench, const testing::ProbePath& local_path
       }
       // It entered through a face and is still under that face at the end of the tick: the ideal
       // probe stays on it.
-      const Vec3 entry = reference_depth(mesh, testing::mixed(last, felt, *time)).normal;
+      const Vec3 entry =
+          runner::evidence::reference_depth(mesh, testing::mixed(last, felt, *time)).normal;
       for (const stimuli::Facet& facet : mesh.facets()) {
         if (glm::length(facet.normal - entry) > 1e-12) continue;
         const double below =
             facet.offset - std::min(glm::dot(entry, felt.tip), glm::dot(entry, felt.tail));
         if (below < 1e-6 * mesh.size()) break;
-        if (reference_gap(mesh, testing::moved(felt, below * entry)) > 1e-3 * tolerance) break;
+        if (runner::evidence::reference_gap(mesh, testing::moved(felt, below * entry)) >
+            1e-3 * tolerance)
+          break;
         ++tally.held_by_face;
         ASSERT_EQ(r.contacts, 1) << "tick " << i << ", below its face by " << below;
         ASSERT_NEAR(r.deepest.depth, below, tolerance) << "tick " << i;
       }
     }
-    was_free = r.contacts == 0 && reference_depth(mesh, felt).depth < 0;
+    was_free = r.contacts == 0 && runner::evidence::reference_depth(mesh, felt).depth < 0;
     last = felt;
   }
 }
@@ -167,7 +170,7 @@ TEST_P(FirstContact, ByTheNearestSideIsAsDeepAsTheReference) {
     for (const LineProbe& end : testing::jumping_path(random, *mesh, length, 20)) {
       Bench bench(*GetParam(), mesh, pose);
       const LineProbe deep = bench.felt(testing::to_world(pose, end));
-      const ReferenceDepth goal = reference_depth(*mesh, deep);
+      const runner::evidence::ReferenceDepth goal = runner::evidence::reference_depth(*mesh, deep);
       if (goal.depth < 1e-4 * mesh->size()) continue;
       ++plunges;
       // Straight in against the normal of the nearest side, which stays the nearest all the way.

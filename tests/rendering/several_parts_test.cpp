@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "runner/bench/tick_meters.h"
+#include "runner/evidence/tick_meters.h"
 #include "tests/shared/union_scenes.h"
 
 namespace palpate::rendering {
@@ -229,9 +229,9 @@ TEST_P(SeveralParts, HundredsOfObjectsAreFeltAtOnceWithoutAllocation) {
   const Scene scene(objects);
   RenderState state = scene.initial_state();
   tick(scene, state, upright(0, -0.01));
-  const std::uint64_t before = runner::bench::allocations();
+  const std::uint64_t before = runner::evidence::allocations();
   const Rendering r = tick(scene, state, upright(0, kPressed));
-  EXPECT_EQ(runner::bench::allocations(), before);
+  EXPECT_EQ(runner::evidence::allocations(), before);
   EXPECT_EQ(r.contacts, kObjects);
   EXPECT_NEAR(r.force.z, kObjects * kSoft * kPressed, 1e-9);
   EXPECT_EQ(r.faults, 0u);
@@ -284,7 +284,8 @@ TEST_P(SeveralParts, NoPartOfAClusterIsEnteredUnfelt) {
       for (const SceneObject& part : parts) {
         LineProbe local = testing::to_local(part.pose, probe);
         if (!GetParam()->side_contact()) local.tail = local.tip;
-        ASSERT_LE(reference_depth(*part.mesh, local).depth, 1e-9) << "seed " << seed;
+        ASSERT_LE(runner::evidence::reference_depth(*part.mesh, local).depth, 1e-9)
+            << "seed " << seed;
       }
     }
   }

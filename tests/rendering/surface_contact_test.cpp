@@ -16,8 +16,8 @@
 #include "data/base/random.h"
 #include "rendering/surface_patch.h"
 #include "rendering/surface_search.h"
-#include "rendering/verification/random_solids.h"
-#include "runner/bench/tick_meters.h"
+#include "runner/evidence/tick_meters.h"
+#include "runner/evidence/verification/random_solids.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"
@@ -228,9 +228,9 @@ TEST_P(SurfaceContact, TheIdealToolIsNeverInside) {
     int contacts = 0;
     for (int i = 0; i < 8000; ++i) {
       const LineProbe probe = hand.next();
-      const std::uint64_t before = runner::bench::allocations();
+      const std::uint64_t before = runner::evidence::allocations();
       const Rendering r = tick(scene, state, probe);
-      ASSERT_EQ(runner::bench::allocations(), before);
+      ASSERT_EQ(runner::evidence::allocations(), before);
       ASSERT_EQ(r.faults & ~render_fault::kReleased, 0U) << round << ' ' << i;
       if (r.contacts == 0 || (r.faults & render_fault::kReleased) != 0) continue;
       ++contacts;
@@ -714,15 +714,15 @@ TEST_P(SurfaceContact, AFineMeshIsNotEnteredByAStylusThatTurnsFast) {
   const Surface& surface = *placed.surface;
   const Scene scene({}, true, {}, nullptr, {placed});
   RenderState state = scene.initial_state();
-  SurfaceStrokeSettings settings;
+  runner::evidence::SurfaceStrokeSettings settings;
   settings.side = GetParam()->side_contact();
-  SurfaceStroke hand(settings);
+  runner::evidence::SurfaceStroke hand(settings);
   double depth = 0;
   int contacts = 0;
   for (int i = 0; i < 4000; ++i) {
-    const std::uint64_t before = runner::bench::allocations();
+    const std::uint64_t before = runner::evidence::allocations();
     const Rendering r = tick(scene, state, hand.next(depth));
-    ASSERT_EQ(runner::bench::allocations(), before);
+    ASSERT_EQ(runner::evidence::allocations(), before);
     depth = r.deepest.depth;
     if (r.contacts == 0 || (r.faults & render_fault::kReleased) != 0) continue;
     ++contacts;

@@ -6,7 +6,7 @@
 #include <cstring>
 #include <limits>
 
-#include "runner/bench/tick_meters.h"
+#include "runner/evidence/tick_meters.h"
 #include "tests/shared/random_mesh.h"
 #include "tests/shared/render_checks.h"
 
@@ -55,12 +55,12 @@ class Tick : public ::testing::TestWithParam<const Renderer*> {
 };
 
 TEST_P(Tick, AllocatesNothing) {
-  if (!runner::bench::counts_allocations())
+  if (!runner::evidence::counts_allocations())
     GTEST_SKIP() << "sanitizers bring their own operator new";
-  const std::uint64_t probe_count = runner::bench::allocations();
+  const std::uint64_t probe_count = runner::evidence::allocations();
   int* volatile kept = new int(1);  // volatile: else the compiler may remove the pair
   delete kept;
-  ASSERT_EQ(runner::bench::allocations(), probe_count + 1) << "the counter does not count";
+  ASSERT_EQ(runner::evidence::allocations(), probe_count + 1) << "the counter does not count";
   int in_contact = 0;
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     Random random(seed, {21});
@@ -68,11 +68,11 @@ TEST_P(Tick, AllocatesNothing) {
     const auto path = some_path(random, *objects[0].mesh);
     const Scene scene(objects);
     RenderState state = scene.initial_state();
-    const std::uint64_t before = runner::bench::allocations();
+    const std::uint64_t before = runner::evidence::allocations();
     for (const LineProbe& probe : path) {
       in_contact += GetParam()->tick(scene, state, probe, kTick).contacts > 0;
     }
-    EXPECT_EQ(runner::bench::allocations(), before) << "seed " << seed;
+    EXPECT_EQ(runner::evidence::allocations(), before) << "seed " << seed;
   }
   EXPECT_GT(in_contact, 500);
 }

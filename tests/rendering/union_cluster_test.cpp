@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "rendering/union_contact.h"
-#include "runner/bench/tick_meters.h"
+#include "runner/evidence/tick_meters.h"
 #include "tests/shared/random_clusters.h"
 
 namespace palpate::rendering {
@@ -147,12 +147,12 @@ TEST_P(UnionCluster, NothingIsAllocatedAndNoNaNGetsThrough) {
     path[200].tail.z = HUGE_VAL;
     path[300].tail = path[300].tip;  // a stylus of length 0
     std::vector<Rendering> out(path.size());
-    const std::uint64_t before = runner::bench::allocations();
+    const std::uint64_t before = runner::evidence::allocations();
     for (std::size_t i = 0; i < path.size(); ++i) {
       state.measured_side = i == 150 && segments > 0 ? Vec3(nan) : Vec3(0);
       out[i] = tick(scene, state, path[i]);
     }
-    EXPECT_EQ(runner::bench::allocations(), before);
+    EXPECT_EQ(runner::evidence::allocations(), before);
     for (std::size_t i = 0; i < path.size(); ++i) {
       const bool broken = i == 100 || i == 200 || (i == 150 && segments > 0);
       EXPECT_EQ((out[i].faults & render_fault::kNonFinite) != 0, broken) << i;

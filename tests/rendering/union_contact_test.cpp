@@ -9,7 +9,7 @@
 #include <numbers>
 
 #include "rendering/union_state.h"
-#include "runner/bench/tick_meters.h"
+#include "runner/evidence/tick_meters.h"
 #include "tests/shared/union_scenes.h"
 
 namespace palpate::rendering {

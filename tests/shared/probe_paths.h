@@ -10,7 +10,7 @@
 
 #include "data/base/random.h"
 #include "rendering/probe.h"
-#include "rendering/verification/reference.h"
+#include "runner/evidence/verification/reference.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/orientation.h"
 
@@ -59,7 +59,7 @@ inline Vec3 middle_of(const stimuli::ConvexMesh& mesh) {
 /// Depth of the middle: the half thickness, roughly. Small against the size for plates and needles.
 inline double half_thickness(const stimuli::ConvexMesh& mesh) {
   const Vec3 middle = middle_of(mesh);
-  return rendering::reference_depth(mesh, {middle, middle}).depth;
+  return runner::evidence::reference_depth(mesh, {middle, middle}).depth;
 }
 
 /// A smooth random function of the distance travelled, within [-1, 1].
@@ -137,7 +137,7 @@ inline ProbePath sliding_path(Random& random, const stimuli::ConvexMesh& mesh, d
       const double half = (inside + outside) / 2;
       const rendering::LineProbe probe =
           probe_at(middle + half * out, direction, side ? length : 0, at_share);
-      (rendering::reference_depth(mesh, probe).depth > 0 ? inside : outside) = half;
+      (runner::evidence::reference_depth(mesh, probe).depth > 0 ? inside : outside) = half;
     }
     const double depth = tick == 0 ? -far : thickness * press * (0.35 + press_wave(travelled));
     path.push_back(probe_at(middle + (inside - depth) * out, direction, length, at_share));

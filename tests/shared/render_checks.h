@@ -12,7 +12,7 @@
 
 #include "rendering/renderer.h"
 #include "rendering/scene.h"
-#include "rendering/verification/reference.h"
+#include "runner/evidence/verification/reference.h"
 #include "tests/shared/probe_paths.h"
 
 namespace palpate::testing {
@@ -76,8 +76,9 @@ class Bench {
 
 /// Distance of a point from the surface of the solid, m.
 inline double off_surface(const stimuli::ConvexMesh& mesh, const Vec3& point) {
-  return std::max(rendering::reference_gap(mesh, {point, point}),
-                  std::abs(std::max(0.0, rendering::reference_depth(mesh, {point, point}).depth)));
+  return std::max(
+      runner::evidence::reference_gap(mesh, {point, point}),
+      std::abs(std::max(0.0, runner::evidence::reference_depth(mesh, {point, point}).depth)));
 }
 
 /// Whether eq. (2) can place a contact at this point: over a facet that is parallel to the probe
@@ -109,7 +110,7 @@ inline std::string faults_of_tick(const Bench& bench, const rendering::LineProbe
   const stimuli::ConvexMesh& mesh = bench.mesh();
   const double size = mesh.size();
   const double rounding = bench.rounding(probe);
-  const double reference = rendering::reference_depth(mesh, bench.felt(probe)).depth;
+  const double reference = runner::evidence::reference_depth(mesh, bench.felt(probe)).depth;
   const auto demand_small = [&](const char* what, double value, double limit) {
     if (!(value <= limit)) out << what << ": " << value << " > " << limit << "; ";
   };
@@ -142,9 +143,10 @@ inline std::string faults_of_tick(const Bench& bench, const rendering::LineProbe
   demand_small("ideal tip", glm::length(r.ideal.tip - probe.tip - shift), 1e-12 * size + rounding);
   demand_small("ideal tail", glm::length(r.ideal.tail - probe.tail - shift),
                1e-12 * size + rounding);
-  demand_small("ideal floats", rendering::reference_gap(mesh, bench.felt(r.ideal)),
+  demand_small("ideal floats", runner::evidence::reference_gap(mesh, bench.felt(r.ideal)),
                1e-9 * size + rounding);
-  demand_small("ideal penetrates", rendering::reference_depth(mesh, bench.felt(r.ideal)).depth,
+  demand_small("ideal penetrates",
+               runner::evidence::reference_depth(mesh, bench.felt(r.ideal)).depth,
                1e-9 * size + rounding);
   demand_small("shallower than the reference by", reference - contact.depth,
                1e-12 * size + rounding);
@@ -197,7 +199,8 @@ class PathCheck {
       const rendering::Rendering r = bench.tick(probe);
       // Only a probe that was inside from the first tick on may stay without force.
       started_inside =
-          started_inside && rendering::reference_depth(bench.mesh(), bench.felt(probe)).depth >= 0;
+          started_inside &&
+          runner::evidence::reference_depth(bench.mesh(), bench.felt(probe)).depth >= 0;
       const std::string faults = faults_of_tick(bench, probe, r, started_inside);
       if (!faults.empty()) return "tick " + std::to_string(i) + ": " + faults;
       ++ticks;

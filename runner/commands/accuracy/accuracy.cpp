@@ -12,16 +12,16 @@
 
 #include "analysis/figures/svg.h"
 #include "rendering/first_contact.h"
-#include "runner/commands/accuracy/report.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/outputs.h"
-#include "runner/commands/shared/progress_line.h"
+#include "runner/evidence/reports/accuracy_report.h"
+#include "runner/output/outputs.h"
+#include "runner/output/progress_line.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::commands {
 namespace {
 
-void study_first_contacts(AccuracyReport& report, int entries) {
+void study_first_contacts(evidence::AccuracyReport& report, int entries) {
   struct Shape {
     const char* name;
     stimuli::PolygonSoup soup;
@@ -35,16 +35,16 @@ void study_first_contacts(AccuracyReport& report, int entries) {
                              for (Vec3& v : plate.vertices) v.z /= 60;
                              return plate;
                            }()}};
-  ProgressLine progress("first contacts");
+  output::ProgressLine progress("first contacts");
   constexpr double kSpeeds[] = {0.1, 0.5, 1, 5};
   const double steps = static_cast<double>(std::size(shapes) * std::size(kSpeeds));
   double done = 0;
   for (const Shape& shape : shapes) {
     const stimuli::ConvexMesh mesh(shape.soup);
-    FirstContactStudy study{shape.name, {}};
+    evidence::FirstContactStudy study{shape.name, {}};
     for (const double speed : kSpeeds) {
       progress.show(done / steps);
-      study.speeds.push_back(rendering::first_contact_loss(mesh, speed, 2, entries, 1));
+      study.speeds.push_back(evidence::first_contact_loss(mesh, speed, 2, entries, 1));
       done += 1;
     }
     report.first_contacts.push_back(std::move(study));
@@ -52,7 +52,7 @@ void study_first_contacts(AccuracyReport& report, int entries) {
 }
 
 /// Cost of one test where neither has a tree: 6 facets and 12 edges, a motion that stays off.
-void time_first_contact(AccuracyReport& report) {
+void time_first_contact(evidence::AccuracyReport& report) {
   const stimuli::ConvexMesh mesh(stimuli::cube(0.06));
   const rendering::ContactTrees trees(mesh, true);
   const auto pose = [](int i) {
@@ -65,15 +65,15 @@ void time_first_contact(AccuracyReport& report) {
                                                  const rendering::LineProbe&)>& test) {
     double fastest = HUGE_VAL;
     for (int round = 0; round < 5; ++round) {
-      const double start = now_ns();
+      const double start = output::now_ns();
       for (int i = 0; i < kTests; ++i) found += test(pose(i), pose(i + 1)) ? 1 : 0;
-      fastest = std::min(fastest, (now_ns() - start) / kTests);
+      fastest = std::min(fastest, (output::now_ns() - start) / kTests);
     }
     return fastest;
   };
   report.paper_test_ns =
       time([&](const rendering::LineProbe& before, const rendering::LineProbe& after) {
-        return rendering::paper_first_contact(mesh, before, after);
+        return evidence::paper_first_contact(mesh, before, after);
       });
   report.exact_test_ns =
       time([&](const rendering::LineProbe& before, const rendering::LineProbe& after) {
@@ -84,11 +84,11 @@ void time_first_contact(AccuracyReport& report) {
 }
 
 /// \param quick  skips the case whose mesh takes seconds to build
-void run_extreme_cases(AccuracyReport& report, bool quick) {
-  ProgressLine progress("extreme cases");
-  const std::span<const rendering::ExtremeCase> cases = rendering::extreme_cases();
+void run_extreme_cases(evidence::AccuracyReport& report, bool quick) {
+  output::ProgressLine progress("extreme cases");
+  const std::span<const evidence::ExtremeCase> cases = evidence::extreme_cases();
   double done = 0;
-  for (const rendering::ExtremeCase& one : cases) {
+  for (const evidence::ExtremeCase& one : cases) {
     progress.show(done++ / static_cast<double>(cases.size()));
     if (quick && std::string_view(one.name) == "million-triangles") continue;
     for (const rendering::Renderer* renderer :
@@ -103,10 +103,10 @@ void run_extreme_cases(AccuracyReport& report, bool quick) {
 template <class Counts>
 Counts in_threads(Counts (*search)(std::uint64_t, std::uint64_t, std::uint64_t),
                   std::uint64_t ticks, std::uint64_t seed, int jobs) {
-  const std::uint64_t walks = (ticks + rendering::kTicksPerWalk - 1) / rendering::kTicksPerWalk;
+  const std::uint64_t walks = (ticks + evidence::kTicksPerWalk - 1) / evidence::kTicksPerWalk;
   constexpr std::uint64_t kBatch = 20;  // walks a thread takes at a time
   Counts all;
-  ProgressLine progress("search");
+  output::ProgressLine progress("search");
   for (std::uint64_t first = 0; first < walks;) {
     progress.show(static_cast<double>(first) / static_cast<double>(walks));
     std::vector<Counts> parts(static_cast<std::size_t>(jobs));
@@ -125,44 +125,45 @@ Counts in_threads(Counts (*search)(std::uint64_t, std::uint64_t, std::uint64_t),
 }
 
 // The measurements of `palpate accuracy`. Shows progress on a terminal.
-rendering::SearchCounts search_in_threads(std::uint64_t ticks, std::uint64_t seed, int jobs) {
-  return in_threads(rendering::search_walks, ticks, seed, jobs);
+evidence::SearchCounts search_in_threads(std::uint64_t ticks, std::uint64_t seed, int jobs) {
+  return in_threads(evidence::search_walks, ticks, seed, jobs);
 }
 
 /// The same search over unions of convex parts and tools.
-rendering::UnionCounts search_unions_in_threads(std::uint64_t ticks, std::uint64_t seed, int jobs) {
-  return in_threads(rendering::search_unions, ticks, seed, jobs);
+evidence::UnionCounts search_unions_in_threads(std::uint64_t ticks, std::uint64_t seed, int jobs) {
+  return in_threads(evidence::search_unions, ticks, seed, jobs);
 }
 
 /// Fills in the whole report, by report.settings: errors and run times, first contacts, unions,
 /// extreme cases, short searches.
 /// \param quick  skips the extreme case whose mesh takes seconds to build
 /// \param seed   of the searches
-void measure_accuracy(AccuracyReport& report, bool quick, int jobs, std::uint64_t seed) {
+void measure_accuracy(evidence::AccuracyReport& report, bool quick, int jobs, std::uint64_t seed) {
   {
-    ProgressLine progress("errors and times");
-    report.rows = rendering::accuracy_study(report.settings, now_ns,
-                                            [&](double done) { progress.show(done); });
+    output::ProgressLine progress("errors and times");
+    report.rows = evidence::accuracy_study(report.settings, output::now_ns,
+                                           [&](double done) { progress.show(done); });
   }
   // In proportion to the other studies: 2000 of each by default.
   study_first_contacts(report,
                        std::max(10, report.settings.paths * report.settings.contact_ticks / 2));
   time_first_contact(report);
   {
-    ProgressLine progress("unions");
+    output::ProgressLine progress("unions");
     if (quick) report.union_settings = {2, 500, 1};
-    report.unions = rendering::union_study(report.union_settings, now_ns,
-                                           [&](double done) { progress.show(done); });
+    report.unions = evidence::union_study(report.union_settings, output::now_ns,
+                                          [&](double done) { progress.show(done); });
   }
   {
-    ProgressLine progress("bodies");
-    report.bodies = rendering::body_study(quick, now_ns, [&](double done) { progress.show(done); });
-    report.body_tick = rendering::body_tick_cost(quick, now_ns);
+    output::ProgressLine progress("bodies");
+    report.bodies =
+        evidence::body_study(quick, output::now_ns, [&](double done) { progress.show(done); });
+    report.body_tick = evidence::body_tick_cost(quick, output::now_ns);
   }
   {
-    ProgressLine progress("soft bodies");
-    report.soft =
-        rendering::soft_study(quick, now_ns, [&progress](double done) { progress.show(done); });
+    output::ProgressLine progress("soft bodies");
+    report.soft = evidence::soft_study(quick, output::now_ns,
+                                       [&progress](double done) { progress.show(done); });
   }
   run_extreme_cases(report, quick);
   constexpr std::uint64_t kShortSearch = 100'000;
@@ -171,8 +172,8 @@ void measure_accuracy(AccuracyReport& report, bool quick, int jobs, std::uint64_
   report.union_search = search_unions_in_threads(kShortSearch, seed, jobs);
 }
 
-rendering::AccuracySettings quick_settings() {
-  rendering::AccuracySettings quick;
+evidence::AccuracySettings quick_settings() {
+  evidence::AccuracySettings quick;
   quick.paths = 2;
   quick.contact_ticks = 500;
   quick.most_triangles = 20480;
@@ -214,7 +215,7 @@ int accuracy_command(const std::vector<std::string>& args) {
       "  palpate accuracy --search 10000000 --unions --seed 2";
   std::string json, figure, page;
   std::uint64_t search_ticks = 0, seed = 1;
-  rendering::AccuracySettings settings;
+  evidence::AccuracySettings settings;
   int jobs = 0;
   auto add = line.options.add_options();
   namespace po = boost::program_options;
@@ -252,9 +253,9 @@ int accuracy_command(const std::vector<std::string>& args) {
   const bool unions = values->count("unions") > 0;
   if (unions && !searching) throw UsageError("--unions: goes with --search");
   if (searching && !figure.empty()) throw UsageError("--figure: a search has no figure");
-  Outputs outputs(*values, {"json", "figure", "report"}, {});
+  output::Outputs outputs(*values, {"json", "figure", "report"}, {});
 
-  AccuracyReport report;
+  evidence::AccuracyReport report;
   if (jobs == 0) jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   if (searching) {
     report.search_seed = seed;
@@ -267,14 +268,16 @@ int accuracy_command(const std::vector<std::string>& args) {
     report.settings = settings;
     measure_accuracy(report, values->count("quick") > 0, jobs, seed);
   }
-  if (outputs.wanted("json")) outputs.put("json", accuracy_json(report).dump(1) + "\n");
+  if (outputs.wanted("json")) outputs.put("json", evidence::accuracy_json(report).dump(1) + "\n");
   if (outputs.wanted("figure"))
-    outputs.put("figure", analysis::figure_svg(accuracy_figure(report), analysis::light_palette()));
-  if (outputs.wanted("report")) outputs.put("report", accuracy_page(report));
+    outputs.put("figure",
+                analysis::figure_svg(evidence::accuracy_figure(report), analysis::light_palette()));
+  if (outputs.wanted("report")) outputs.put("report", evidence::accuracy_page(report));
   outputs.write();
-  std::cout << accuracy_text(report);
-  const bool extremes_hold = std::all_of(report.extremes.begin(), report.extremes.end(),
-                                         [](const ExtremeRow& row) { return row.result.passed; });
+  std::cout << evidence::accuracy_text(report);
+  const bool extremes_hold =
+      std::all_of(report.extremes.begin(), report.extremes.end(),
+                  [](const evidence::ExtremeRow& row) { return row.result.passed; });
   const std::uint64_t wrong = (report.search ? report.search->wrong() : 0) +
                               (report.union_search ? report.union_search->wrong() : 0);
   return extremes_hold && wrong == 0 ? 0 : 1;

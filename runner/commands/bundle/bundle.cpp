@@ -18,13 +18,14 @@
 #include "data/files/utc.h"
 #include "data/store/store.h"
 #include "protocols/json_document.h"
-#include "runner/commands/bundle/contents.h"
-#include "runner/commands/check/deviations.h"
-#include "runner/commands/register/registration.h"
-#include "runner/commands/shared/about_file.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/protocol_choice.h"
-#include "runner/commands/shared/sealed_folder.h"
+#include "runner/registration/about_file.h"
+#include "runner/registration/bundle_contents.h"
+#include "runner/registration/deviations.h"
+#include "runner/registration/registration.h"
+#include "runner/registration/sealed_folder.h"
+#include "runner/study/export_settings.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -39,11 +40,11 @@ struct BundleOptions {
 
 void put_data(const BundleOptions& options, data::Store& store, const data::StudyAbout& about,
               const data::AtomicFolder& draft) {
-  data::ExportSettings settings = export_settings();
+  data::ExportSettings settings = study::export_settings();
   settings.times = data::Times::relative;
   settings.codebook = draft.prepare("data/codebook.csv");
-  settings.recorded_as = (fs::path(options.out) / kTrials).string();
-  data::ExportResult done = data::export_csv(store, draft.prepare(kTrials), settings);
+  settings.recorded_as = (fs::path(options.out) / registration::kTrials).string();
+  data::ExportResult done = data::export_csv(store, draft.prepare(registration::kTrials), settings);
   std::string not_recorded = done.not_recorded;
   settings.codebook.clear();
   settings.about = about;
@@ -58,8 +59,9 @@ void put_data(const BundleOptions& options, data::Store& store, const data::Stud
 }
 
 void put_registration(const std::string& folder, const data::AtomicFolder& draft) {
-  for (const std::string& name : files_below(folder))
-    write_member(draft, "registration/" + name, read_member(folder, name));
+  for (const std::string& name : registration::files_below(folder))
+    registration::write_member(draft, "registration/" + name,
+                               registration::read_member(folder, name));
 }
 
 /// "2026-11-25"
@@ -72,34 +74,39 @@ std::string today() {
 
 int make_bundle(const BundleOptions& options) {
   const std::string about_text = protocols::read_text_file(options.about);
-  const data::StudyAbout about = read_about_file(options.about);
+  const data::StudyAbout about = registration::read_about_file(options.about);
   if (about.license.empty())
     throw UsageError(options.about +
                      ": expected a license, without which "
                      "nobody may use the bundle, such as "
                      "\"license\": \"CC-BY-4.0\"");
-  const Registration registered = read_registration(options.registration);
-  require_replaceable_folder(options.out, options.force, kCrate);
-  const StudyCheck check =
-      check_study(registered, options.registration, options.database, {.digest = options.digest});
+  const registration::Registration registered =
+      registration::read_registration(options.registration);
+  registration::require_replaceable_folder(options.out, options.force, registration::kCrate);
+  const registration::StudyCheck check = registration::check_study(
+      registered, options.registration, options.database, {.digest = options.digest});
   data::Store store = data::Store::open(options.database, data::Store::Mode::read_for_export);
   warn_of_exposure(options.database);
   data::AtomicFolder draft(options.out);
   put_data(options, store, about, draft);
   put_registration(options.registration, draft);
-  write_member(draft, "about.json", about_text);
-  write_member(draft, kRecord, record_json(analysis::read_study_record(options.database), check));
-  const BundleFacts facts = bundle_facts(draft / "", check.points);
-  for (const auto& [name, text] : derived_files(facts)) write_member(draft, name, text);
+  registration::write_member(draft, "about.json", about_text);
+  registration::write_member(
+      draft, registration::kRecord,
+      registration::record_json(analysis::read_study_record(options.database), check));
+  const registration::BundleFacts facts = registration::bundle_facts(draft / "", check.points);
+  for (const auto& [name, text] : registration::derived_files(facts))
+    registration::write_member(draft, name, text);
   ::chmod((draft / "reproduce.sh").c_str(), 0700);
-  write_member(draft, kCrate, crate_text(draft / "", facts, today()));
-  write_checksums(draft);
+  registration::write_member(draft, registration::kCrate,
+                             registration::crate_text(draft / "", facts, today()));
+  registration::write_checksums(draft);
   draft.commit(options.force);
   std::cout << printable(options.out) << ": " << registered.protocol.name << ", "
             << analysis::counted(facts.check.participants, "participant", "participants")
             << (facts.check.label.empty() ? "" : ", " + facts.check.label) << "\n"
-            << conclusion_of(facts.check) << "\nDigest of the registration " << registered.digest
-            << "\n";
+            << registration::conclusion_of(facts.check) << "\nDigest of the registration "
+            << registered.digest << "\n";
   for (const auto& [one, judgement] : facts.check.hypotheses)
     std::cout << one.id << ": " << analysis::to_string(judgement.verdict) << "\n";
   return 0;
@@ -155,8 +162,8 @@ int bundle_command(const std::vector<std::string>& args) {
       throw UsageError(std::string(verify ? "--verify: without --" : "expected --") + option +
                        "\nUsage: " + line.usage + "\nMore: add --help");
   }
-  if (values->count("digest")) read_digest(options.digest);
-  if (verify) return verify_bundle(options.verify, options.digest);
+  if (values->count("digest")) registration::read_digest(options.digest);
+  if (verify) return registration::verify_bundle(options.verify, options.digest);
   if (options.format != "psych-ds" && options.format != "bids")
     throw UsageError("--format: expected psych-ds or bids, found '" +
                      printable(options.format, 60) + "'");

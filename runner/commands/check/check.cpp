@@ -7,9 +7,9 @@
 
 #include "data/base/text.h"
 #include "protocols/json_document.h"
-#include "runner/commands/check/deviations.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/outputs.h"
+#include "runner/output/outputs.h"
+#include "runner/registration/deviations.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -63,11 +63,11 @@ int check_command(const std::vector<std::string>& args) {
   const auto values = line.parse(args);
   if (!values) return 0;
   const std::string folder = (*values)["REGISTRATION"].as<std::string>();
-  Outputs outputs(*values, {"json", "report"}, {"db", "analysis"});
+  output::Outputs outputs(*values, {"json", "report"}, {"db", "analysis"});
   for (const char* option : {"json", "report"}) require_outside(*values, option, folder);
-  ReportedAnalysis reported;
+  registration::ReportedAnalysis reported;
   if (!analysis_file.empty())
-    reported = read_reported(protocols::read_text_file(analysis_file), analysis_file);
+    reported = registration::read_reported(protocols::read_text_file(analysis_file), analysis_file);
   if (values->count("too-fast-s")) {
     if (!(too_fast > 0)) throw UsageError("--too-fast-s: expected a time in s above 0");
     if (reported.too_fast)
@@ -78,14 +78,15 @@ int check_command(const std::vector<std::string>& args) {
     if (!(alpha > 0 && alpha < 1)) throw UsageError("--alpha: expected a number from 0 to 1");
     reported.alpha = alpha;
   }
-  if (values->count("digest")) reported.digest = read_digest(digest);
-  const Registration registered = read_registration(folder);
+  if (values->count("digest")) reported.digest = registration::read_digest(digest);
+  const registration::Registration registered = registration::read_registration(folder);
   warn_of_exposure(database);
-  const StudyCheck check = check_study(registered, folder, database, reported);
-  if (outputs.wanted("json")) outputs.put("json", check_json(check, registered));
-  if (outputs.wanted("report")) outputs.put("report", check_html(check, registered));
+  const registration::StudyCheck check =
+      registration::check_study(registered, folder, database, reported);
+  if (outputs.wanted("json")) outputs.put("json", registration::check_json(check, registered));
+  if (outputs.wanted("report")) outputs.put("report", registration::check_html(check, registered));
   outputs.write();
-  std::cout << check_text(check, registered);
+  std::cout << registration::check_text(check, registered);
   return check.deviations() > 0 ? 1 : 0;
 }
 

@@ -30,13 +30,14 @@
 #include "protocols/parse.h"
 #include "protocols/protocol.h"
 #include "protocols/tasks/task_plan.h"
-#include "runner/commands/cluster/cluster_job.h"
 #include "runner/commands/plan/plan.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/outputs.h"
 #include "runner/commands/shared/study_options.h"
 #include "runner/commands/sweep/planned.h"
+#include "runner/output/outputs.h"
 #include "runner/session/run_record.h"
+#include "runner/study/simulation_limits.h"
+#include "runner/sweep/cluster_job.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -117,7 +118,7 @@ std::map<std::int64_t, std::string> queue_states(const std::string& job) {
   return out;
 }
 
-fs::path part_of(const fs::path& folder, const ClusterJob& job, std::int64_t shard) {
+fs::path part_of(const fs::path& folder, const sweep::ClusterJob& job, std::int64_t shard) {
   const std::string digits = std::to_string(shard);
   return folder / "parts" /
          ("part" + std::string(6 - std::min<std::size_t>(6, digits.size()), '0') + digits +
@@ -125,7 +126,7 @@ fs::path part_of(const fs::path& folder, const ClusterJob& job, std::int64_t sha
 }
 
 /// Units in a shard's file.
-std::int64_t recorded_in(const ClusterJob& job, const std::string& path) {
+std::int64_t recorded_in(const sweep::ClusterJob& job, const std::string& path) {
   if (!fs::exists(path)) return 0;
   if (job.work == "plan") return 1;  // written at once
   if (job.work == "sweep") return data::SweepFile::open(path).count();
@@ -137,7 +138,7 @@ std::int64_t recorded_in(const ClusterJob& job, const std::string& path) {
 
 /// \param text  after the first line, which names the shell
 void write_script(const fs::path& path, const std::string& text) {
-  write_whole(path.string(), "#!/bin/bash\numask 077\n" + text);
+  output::write_whole(path.string(), "#!/bin/bash\numask 077\n" + text);
   ::chmod(path.c_str(), 0700);
 }
 
@@ -149,7 +150,7 @@ std::int64_t seconds_since_1970() {
 
 /// Units in the merged file; 0: there is none yet. A plan has no such file and needs none.
 /// \throws data::StoreRefused
-std::int64_t merged_units(const fs::path& folder, const ClusterJob& job) {
+std::int64_t merged_units(const fs::path& folder, const sweep::ClusterJob& job) {
   if (job.work == "plan") return job.items;
   return recorded_in(job, (folder / ("all" + std::string(job.extension()))).string());
 }
@@ -174,7 +175,7 @@ std::vector<std::string> copy_inputs(const fs::path& folder, const protocols::Pr
   fs::create_directories(place);
   const auto put = [](const fs::path& path, const std::string& bytes) {
     fs::create_directories(path.parent_path());
-    write_whole(path.string(), bytes);
+    output::write_whole(path.string(), bytes);
   };
   put(place / "protocol.json", info.text);
   for (const data::ProtocolFile& file : info.files)
@@ -189,7 +190,7 @@ std::vector<std::string> copy_inputs(const fs::path& folder, const protocols::Pr
 }
 
 /// By shard, from 1, read from its file. \throws data::StoreRefused
-std::vector<ShardState> shard_states(const fs::path& folder, const ClusterJob& job) {
+std::vector<ShardState> shard_states(const fs::path& folder, const sweep::ClusterJob& job) {
   std::vector<ShardState> out;
   for (std::int64_t number = 1; number <= job.shards; ++number) {
     const Shard shard{number, job.shards};
@@ -229,7 +230,7 @@ void require_own_scripts(const fs::path& folder) {
 
 /// Submits the unfinished shards as an array job, followed by the merging job; reports on stdout.
 /// \throws std::runtime_error with sbatch's message
-void submit_shards(const fs::path& folder, ClusterJob& job) {
+void submit_shards(const fs::path& folder, sweep::ClusterJob& job) {
   require_own_scripts(folder);
   const std::vector<ShardState> states = shard_states(folder, job);
   std::vector<std::int64_t> todo;
@@ -247,7 +248,7 @@ void submit_shards(const fs::path& folder, ClusterJob& job) {
     job.array_job = submit(array);
     job.submitted_s = seconds_since_1970();
     job.done_then = recorded_units(states);
-    write_job(folder, job);
+    sweep::write_job(folder, job);
     // If a shard fails, this job is cancelled; the next 'submit' makes it again.
     finish.push_back("--dependency=afterok:" + job.array_job);
     finish.push_back("--kill-on-invalid-dep=yes");
@@ -263,7 +264,8 @@ void submit_shards(const fs::path& folder, ClusterJob& job) {
 /// Writes shard.sh K, which runs or resumes a shard, and finish.sh, which merges the parts and
 /// analyses them. \param command  of a shard, without --jobs, --shard and --db
 // "#SBATCH" is not used: cluster.json has the arguments of sbatch, for both jobs.
-void write_scripts(const fs::path& folder, const ClusterJob& job, const std::string& command) {
+void write_scripts(const fs::path& folder, const sweep::ClusterJob& job,
+                   const std::string& command) {
   const std::string program = shell_quoted(fs::read_symlink("/proc/self/exe").string());
   const std::string enter = "cd " + shell_quoted(folder.string());
   const std::string extension = job.extension();
@@ -372,10 +374,10 @@ fs::path make_folder(const ClusterSettings& settings) {
   return folder;
 }
 
-int submit_or_say(const ClusterSettings& settings, const fs::path& folder, ClusterJob job) {
+int submit_or_say(const ClusterSettings& settings, const fs::path& folder, sweep::ClusterJob job) {
   if (!settings.time.empty()) job.options.push_back("--time=" + settings.time);
   if (!settings.partition.empty()) job.options.push_back("--partition=" + settings.partition);
-  write_job(folder, job);
+  sweep::write_job(folder, job);
   if (settings.no_submit) {
     std::cout << printable(folder.string()) << ": ready; submit with: palpate cluster submit "
               << printable(settings.folder) << "\n";
@@ -387,8 +389,8 @@ int submit_or_say(const ClusterSettings& settings, const fs::path& folder, Clust
 
 /// \param others  files that the tasks read beside the protocol. \param command  of a shard,
 /// relative to the copies of protocol and others
-int begin(const ClusterSettings& settings, ClusterJob job, const protocols::Protocol& protocol,
-          const std::vector<std::string>& others,
+int begin(const ClusterSettings& settings, sweep::ClusterJob job,
+          const protocols::Protocol& protocol, const std::vector<std::string>& others,
           const std::function<std::string(const std::vector<std::string>&)>& command,
           double felt_an_item) {
   if (settings.shards < 1 || settings.shards > std::min<std::int64_t>(job.items, 999'999)) {
@@ -435,7 +437,7 @@ int begin_sweep(const ClusterSettings& settings, const SweepSettings& sweep) {
     if (sweep.repetitions > 0) out += " --repetitions " + std::to_string(sweep.repetitions);
     return inputs[2].empty() ? out : out + " --settings " + shell_quoted(inputs[2]);
   };
-  ClusterJob job;
+  sweep::ClusterJob job;
   job.work = "sweep";
   job.unit = "points";
   job.items = planned.plan.points;
@@ -446,7 +448,8 @@ int begin_sweep(const ClusterSettings& settings, const SweepSettings& sweep) {
 
 int begin_study(const ClusterSettings& settings, const StudyOptions& study) {
   protocols::Protocol protocol = protocols::parse_protocol(study.protocol);
-  fit_to_simulation(protocol, participants::load_simulated_settings(study.patch, study.version));
+  study::fit_to_simulation(protocol,
+                           participants::load_simulated_settings(study.patch, study.version));
   const auto command = [&](const std::vector<std::string>& inputs) {
     const std::string out = "simulate " + shell_quoted(inputs[0]) + " --participants " +
                             std::to_string(study.participants) + " --seed " +
@@ -454,7 +457,7 @@ int begin_study(const ClusterSettings& settings, const StudyOptions& study) {
                             std::to_string(study.version);
     return inputs[1].empty() ? out : out + " --settings " + shell_quoted(inputs[1]);
   };
-  ClusterJob job;
+  sweep::ClusterJob job;
   job.work = "simulate";
   job.unit = "sessions";
   job.items = study.participants;
@@ -465,7 +468,7 @@ int begin_study(const ClusterSettings& settings, const StudyOptions& study) {
 
 int cluster_submit(const std::string& given) {
   const fs::path folder = fs::absolute(given).lexically_normal();
-  ClusterJob job = read_job(folder);
+  sweep::ClusterJob job = sweep::read_job(folder);
   if (!job.array_job.empty() && !queue_states(job.array_job).empty()) {
     throw UsageError("job " + job.array_job +
                      " is still in the queue; wait for its end, or: scancel " + job.array_job);
@@ -476,7 +479,7 @@ int cluster_submit(const std::string& given) {
 
 int cluster_status(const std::string& given) {
   const fs::path folder = fs::absolute(given).lexically_normal();
-  const ClusterJob job = read_job(folder);
+  const sweep::ClusterJob job = sweep::read_job(folder);
   const std::vector<ShardState> states = shard_states(folder, job);
   std::map<std::int64_t, std::string> queue;
   if (!job.array_job.empty()) {
@@ -538,7 +541,7 @@ int begin_plan(const ClusterSettings& settings, const PlanOptions& options,
   analysis::Pilot pilot = starting_point(options, values);
   model_of(pilot, options, values);  // refuses bad options here
   const analysis::PlanSettings plan = settings_of(options, values);
-  ClusterJob job;
+  sweep::ClusterJob job;
   job.work = "plan";
   job.unit = "curves";
   job.items = job.shards = static_cast<std::int64_t>(plan.trials.size());

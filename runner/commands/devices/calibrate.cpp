@@ -13,11 +13,11 @@
 #include "data/files/utc.h"
 #include "runner/commands/devices/devices.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/outputs.h"
 #include "runner/devices/falcon/calibration.h"
 #include "runner/devices/falcon/falcon.h"
 #include "runner/devices/falcon/stylus_from_ends.h"
 #include "runner/devices/registry.h"
+#include "runner/output/outputs.h"
 #include "runner/safety/fault_signals.h"
 #include "runner/safety/guarded_device.h"
 #include "runner/servo/realtime.h"
@@ -134,7 +134,7 @@ std::unique_ptr<safety::GuardedDevice> guarded(devices::OpenEnd open,
 constexpr double kWeighingRate = 200, kRegistrationRate = 50;  // Hz; registration uses no force
 
 void store(const std::string& path, const Calibration& calibration) {
-  write_whole(path, to_json(calibration));
+  output::write_whole(path, to_json(calibration));
   std::cerr << "Stored in " << printable(path) << "\n";
 }
 

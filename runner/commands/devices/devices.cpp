@@ -28,10 +28,10 @@
 #include "data/files/utc.h"
 #include "runner/commands/run/opening.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/outputs.h"
 #include "runner/devices/device_delay.h"
 #include "runner/devices/registry.h"
 #include "runner/devices/self_test.h"
+#include "runner/output/outputs.h"
 #include "runner/safety/guarded_device.h"
 #include "runner/safety/shared_memory.h"
 #include "runner/servo/realtime.h"
@@ -836,7 +836,7 @@ int devices_command(const std::vector<std::string>& args) {
     return try_markers((*values)["markers"].as<std::vector<std::string>>());
   }
   const servo::DeviceConfig config = config_of(*values);
-  Outputs outputs(*values, {"json"}, {"calibration", "firmware"});
+  output::Outputs outputs(*values, {"json"}, {"calibration", "firmware"});
   if (values->count("report") > 0) {
     for (const char* other : {"timing", "calibrate", "json"}) {
       if (values->count(other) > 0)

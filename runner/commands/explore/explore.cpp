@@ -19,15 +19,15 @@
 #include "protocols/parse.h"
 #include "rendering/renderer.h"
 #include "runner/commands/explore/live_touch.h"
-#include "runner/commands/render/forces.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/outputs.h"
-#include "runner/commands/shared/progress_line.h"
-#include "runner/commands/shared/scene_notes.h"
 #include "runner/display/scene/painter.h"
 #include "runner/display/scene/scene_drawing.h"
+#include "runner/output/outputs.h"
+#include "runner/output/progress_line.h"
 #include "runner/safety/fault_signals.h"
 #include "runner/scene_builder.h"
+#include "runner/touch/forces.h"
+#include "runner/touch/scene_notes.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -84,7 +84,7 @@ bool is_frame_name(const std::string& name) {
 }
 
 /// The rows of the path to draw: at each multiple of `every` the last one before it.
-std::vector<std::size_t> shown_rows(const std::vector<TimedPose>& poses, double every) {
+std::vector<std::size_t> shown_rows(const std::vector<touch::TimedPose>& poses, double every) {
   const double length = poses.back().t - poses.front().t;
   const double count = std::floor(length / every + kSlack) + 1;
   if (count > static_cast<double>(kMostFrames))
@@ -108,13 +108,13 @@ struct TouchedScene {
 };
 
 TouchedScene touch(const rendering::Scene& scene, const protocols::SceneSpec& spec,
-                   const rendering::Renderer& renderer, const std::vector<TimedPose>& poses,
+                   const rendering::Renderer& renderer, const std::vector<touch::TimedPose>& poses,
                    const std::vector<std::size_t>& rows) {
   TouchedScene out;
   std::size_t row = 0, next = 0;
-  render_along(
+  touch::render_along(
       scene, spec, renderer, poses,
-      [&](const TimedPose& pose, const rendering::Rendering& rendering,
+      [&](const touch::TimedPose& pose, const rendering::Rendering& rendering,
           const rendering::RenderState& state) {
         const bool shown = next < rows.size() && rows[next] == row++;
         // Scale arrows by the whole path, not only by the drawn rows.
@@ -143,16 +143,17 @@ display::SceneDrawingSettings drawing_settings(const display::SceneDrawing& draw
 std::pair<double, double> tick_costs(const rendering::Scene& scene,
                                      const protocols::SceneSpec& spec,
                                      const rendering::Renderer& renderer,
-                                     const std::vector<TimedPose>& poses) {
+                                     const std::vector<touch::TimedPose>& poses) {
   std::vector<double> costs;
   costs.reserve(poses.size());
-  double before = now_ns();
-  render_along(scene, spec, renderer, poses,
-               [&](const TimedPose&, const rendering::Rendering&, const rendering::RenderState&) {
-                 const double now = now_ns();
-                 costs.push_back(now - before);
-                 before = now_ns();
-               });
+  double before = output::now_ns();
+  touch::render_along(
+      scene, spec, renderer, poses,
+      [&](const touch::TimedPose&, const rendering::Rendering&, const rendering::RenderState&) {
+        const double now = output::now_ns();
+        costs.push_back(now - before);
+        before = output::now_ns();
+      });
   std::ranges::sort(costs);
   return {costs[costs.size() / 2], costs[costs.size() * 99 / 100]};
 }
@@ -196,11 +197,11 @@ void check_frames_folder(const std::string& folder, bool may_replace) {
 
 /// \param scene_path  that faults name. \throws UsageError, DisplayError, MeshError, StoreError
 DrawnFrames draw_frames(const std::string& scene_path, const protocols::SceneSpec& spec,
-                        const rendering::Renderer& renderer, const std::vector<TimedPose>& poses,
-                        const FrameSettings& settings) {
+                        const rendering::Renderer& renderer,
+                        const std::vector<touch::TimedPose>& poses, const FrameSettings& settings) {
   const std::vector<std::size_t> rows = shown_rows(poses, settings.every);
   SceneBuilder builder;
-  const rendering::Scene scene = build_scene(builder, scene_path, spec, renderer);
+  const rendering::Scene scene = touch::build_scene(builder, scene_path, spec, renderer);
   const TouchedScene touched = touch(scene, spec, renderer, poses, rows);
   display::SceneDrawing drawing(spec.objects, tool_of(spec.tool));
   drawing.add_compiled(scene);
@@ -211,7 +212,7 @@ DrawnFrames draw_frames(const std::string& scene_path, const protocols::SceneSpe
       display::make_painter(settings.size.width, settings.size.height);
   std::optional<data::AtomicFolder> folder;
   if (!settings.folder.empty()) folder.emplace(settings.folder);
-  ProgressLine progress("pictures");
+  output::ProgressLine progress("pictures");
   for (std::size_t i = 0; i < touched.moments.size(); ++i) {
     display::ScenePicture picture =
         drawing.picture(touched.moments[i], display::light_theme(), looks);
@@ -230,7 +231,7 @@ DrawnFrames draw_frames(const std::string& scene_path, const protocols::SceneSpe
   DrawnFrames out{.pictures = touched.moments.size(),
                   .animation = {},
                   .seconds = poses.back().t - poses.front().t,
-                  .notes = scene_notes(spec, scene, builder),
+                  .notes = touch::scene_notes(spec, scene, builder),
                   .tick_median_ns = median,
                   .tick_p99_ns = p99};
   if (settings.animate)
@@ -371,7 +372,7 @@ int draw_pictures(const po::variables_map& values, const rendering::Renderer& re
     if (values.count(option) > 0)
       throw UsageError("--" + std::string(option) +
                        " goes with the window: leave out --frames and --animation");
-  Outputs outputs(values, {"animation"}, {"SCENE.json", "trajectory"});
+  output::Outputs outputs(values, {"animation"}, {"SCENE.json", "trajectory"});
   const std::string animation =
       values.count("animation") > 0 ? text_of(values, "animation") : std::string();
   if (!animation.empty() && !animation.ends_with(".webp"))
@@ -380,7 +381,7 @@ int draw_pictures(const po::variables_map& values, const rendering::Renderer& re
   const std::string scene_path = text_of(values, "SCENE.json");
   const protocols::SceneSpec spec = protocols::parse_scene(scene_path);
   for (const stimuli::ObjectSpec& object : spec.objects) outputs.protect(object);
-  const std::vector<TimedPose> poses = read_trajectory(text_of(values, "trajectory"));
+  const std::vector<touch::TimedPose> poses = touch::read_trajectory(text_of(values, "trajectory"));
   DrawnFrames drawn = draw_frames(scene_path, spec, renderer, poses, settings);
   for (const std::string& note : drawn.notes)
     std::cerr << printable(scene_path) << ": " << note << '\n';
@@ -436,7 +437,7 @@ int explore_command(const std::vector<std::string>& args) {
   add_explore_options(line, device);
   const auto values = line.parse(args);
   if (!values) return 0;
-  const rendering::Renderer& renderer = renderer_named(text_of(*values, "renderer"));
+  const rendering::Renderer& renderer = touch::renderer_named(text_of(*values, "renderer"));
   const bool draws = values->count("frames") > 0 || values->count("animation") > 0;
   if (draws) return draw_pictures(*values, renderer);
   for (const char* option : {"size", "every", "view"})

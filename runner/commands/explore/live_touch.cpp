@@ -15,18 +15,18 @@
 
 #include "data/base/text.h"
 #include "data/files/file_permissions.h"
-#include "runner/commands/render/forces.h"
 #include "runner/commands/run/opening.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/outputs.h"
-#include "runner/commands/shared/progress_line.h"
-#include "runner/commands/shared/scene_notes.h"
 #include "runner/display/explore_window.h"
 #include "runner/display/timeline.h"
+#include "runner/output/outputs.h"
+#include "runner/output/progress_line.h"
 #include "runner/safety/fault_signals.h"
 #include "runner/serve/served_scene.h"
 #include "runner/servo/sample.h"
 #include "runner/session/device_check.h"
+#include "runner/touch/forces.h"
+#include "runner/touch/scene_notes.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -45,7 +45,7 @@ std::string keep_in(const std::string& folder, const std::string& bytes, const c
     for (int number = 1;; ++number) {
       const fs::path path = fs::path(folder) / ("scene-" + std::to_string(number) + kind);
       if (fs::exists(path)) continue;
-      write_whole(path.string(), bytes);
+      output::write_whole(path.string(), bytes);
       return "kept as " + path.string();
     }
   } catch (const std::exception& fault) {
@@ -58,8 +58,8 @@ display::ExploreSettings window_settings(const protocols::SceneSpec& spec,
                                          const HandsOnSettings& settings) {
   display::SceneDrawing drawing(spec.objects, tool_of(spec.tool));
   SceneBuilder builder;
-  const rendering::Scene scene = build_scene(builder, settings.scene_path, spec, renderer);
-  for (const std::string& note : scene_notes(spec, scene, builder))
+  const rendering::Scene scene = touch::build_scene(builder, settings.scene_path, spec, renderer);
+  for (const std::string& note : touch::scene_notes(spec, scene, builder))
     std::cerr << printable(settings.scene_path) << ": " << note << '\n';
   drawing.add_compiled(scene);
   display::ExploreSettings out{
@@ -153,13 +153,13 @@ constexpr servo::HomeZone kAnywhere{.radius = 0, .rest = 0};
 
 }  // namespace
 
-display::SceneMoment moment_of(const TimedPose& pose, const protocols::SceneSpec& spec,
+display::SceneMoment moment_of(const touch::TimedPose& pose, const protocols::SceneSpec& spec,
                                const rendering::Scene& scene, const rendering::Rendering& rendering,
                                const rendering::RenderState& state) {
   display::SceneMoment out{.sample = {},
                            .contacts = display::contact_places(scene, state, rendering)};
   out.sample.time_ns = std::llround(pose.t * 1e9);
-  out.sample.probe = virtual_stylus(spec, pose.probe);
+  out.sample.probe = touch::virtual_stylus(spec, pose.probe);
   out.sample.rendering = rendering;
   out.sample.faults = rendering.faults;
   out.sample.device1 = rendering.device1;
@@ -171,7 +171,8 @@ display::SceneMoment moment_of(const TimedPose& pose, const protocols::SceneSpec
 }
 
 RecordedTouch::RecordedTouch(std::string scene_path, protocols::SceneSpec spec,
-                             const rendering::Renderer& renderer, std::vector<TimedPose> poses)
+                             const rendering::Renderer& renderer,
+                             std::vector<touch::TimedPose> poses)
     : scene_path_(std::move(scene_path)),
       spec_(std::move(spec)),
       renderer_(renderer),
@@ -181,7 +182,7 @@ RecordedTouch::RecordedTouch(std::string scene_path, protocols::SceneSpec spec,
 
 void RecordedTouch::touch() {
   SceneBuilder builder;
-  const rendering::Scene scene = build_scene(builder, scene_path_, spec_, renderer_);
+  const rendering::Scene scene = touch::build_scene(builder, scene_path_, spec_, renderer_);
   const std::size_t stride =
       (poses_.size() + display::Timeline::kMost - 2) / (display::Timeline::kMost - 1);
   std::size_t row = 0;
@@ -189,20 +190,21 @@ void RecordedTouch::touch() {
   double soft_time = -1;  // of the surfaces that were kept last: fewer than there are ticks
   std::vector<std::shared_ptr<const display::SoftSurfaceNow>> soft;
   moments_.clear();
-  render_along(scene, spec_, renderer_, poses_,
-               [&](const TimedPose& pose, const rendering::Rendering& rendering,
-                   const rendering::RenderState& state) {
-                 faults |= rendering.faults;  // of rows that are not kept as well
-                 if (row++ % stride != 0) return;
-                 moments_.push_back(moment_of(pose, spec_, scene, rendering, state));
-                 moments_.back().sample.faults = std::exchange(faults, 0);
-                 if (pose.t >= soft_time && pose.t < soft_time + kSoftInterval && soft_time >= 0) {
-                   moments_.back().soft = soft;
-                 } else {
-                   soft = moments_.back().soft;
-                   soft_time = pose.t;
-                 }
-               });
+  touch::render_along(
+      scene, spec_, renderer_, poses_,
+      [&](const touch::TimedPose& pose, const rendering::Rendering& rendering,
+          const rendering::RenderState& state) {
+        faults |= rendering.faults;  // of rows that are not kept as well
+        if (row++ % stride != 0) return;
+        moments_.push_back(moment_of(pose, spec_, scene, rendering, state));
+        moments_.back().sample.faults = std::exchange(faults, 0);
+        if (pose.t >= soft_time && pose.t < soft_time + kSoftInterval && soft_time >= 0) {
+          moments_.back().soft = soft;
+        } else {
+          soft = moments_.back().soft;
+          soft_time = pose.t;
+        }
+      });
 }
 
 void RecordedTouch::take(std::vector<display::SceneMoment>& out) {
@@ -226,9 +228,10 @@ void RecordedTouch::show(const std::vector<stimuli::ObjectSpec>& objects) {
 int explore_hands_on(const protocols::SceneSpec& spec, const rendering::Renderer& renderer,
                      const HandsOnSettings& settings) {
   if (settings.trajectory.empty()) return explore_live(spec, renderer, settings);
-  RecordedTouch touch(settings.scene_path, spec, renderer, read_trajectory(settings.trajectory));
+  RecordedTouch touch(settings.scene_path, spec, renderer,
+                      touch::read_trajectory(settings.trajectory));
   display::ExploreSettings window = window_settings(spec, renderer, settings);
-  window.end_requested = [&stop = catch_stop_signals()] { return stop.load(); };
+  window.end_requested = [&stop = output::catch_stop_signals()] { return stop.load(); };
   display::explore_in_window(std::move(window), touch);
   return 0;
 }
@@ -260,7 +263,7 @@ void LiveTouch::prepare(const std::vector<stimuli::ObjectSpec>& objects) {
   begun_ = touched_once_ = false;
   marker_.renderer = settings_.renderer->side_contact() ? "ray" : "point";
   servo_.prepare(
-      build_scene(builder, settings_.scene_path, with_objects(objects), *settings_.renderer),
+      touch::build_scene(builder, settings_.scene_path, with_objects(objects), *settings_.renderer),
       *settings_.renderer, kAnywhere);
 }
 
@@ -371,8 +374,8 @@ void LiveTouch::stop_or_go_on(std::optional<std::vector<stimuli::ObjectSpec>> wa
     const std::vector<stimuli::ObjectSpec> before = std::exchange(shown_, std::move(*wanted));
     try {
       SceneBuilder builder;
-      const bool restarts = !servo_.change_feel(
-          build_scene(builder, settings_.scene_path, with_objects(shown_), *settings_.renderer));
+      const bool restarts = !servo_.change_feel(touch::build_scene(
+          builder, settings_.scene_path, with_objects(shown_), *settings_.renderer));
       anew_ = held && restarts;
       if (restarts && !held) {
         prepare(shown_);

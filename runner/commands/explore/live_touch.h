@@ -15,17 +15,17 @@
 
 #include "protocols/parse.h"
 #include "rendering/renderer.h"
-#include "runner/commands/render/forces.h"
 #include "runner/commands/run/settings.h"
 #include "runner/display/display.h"
 #include "runner/servo/servo_thread.h"
 #include "runner/session/markers.h"
 #include "runner/session/sample_stream.h"
+#include "runner/touch/forces.h"
 
 namespace palpate::runner::commands {
 
 /// The moment of a scene at a tick along a recorded path. \param state  after the tick
-display::SceneMoment moment_of(const TimedPose& pose, const protocols::SceneSpec& spec,
+display::SceneMoment moment_of(const touch::TimedPose& pose, const protocols::SceneSpec& spec,
                                const rendering::Scene& scene, const rendering::Rendering& rendering,
                                const rendering::RenderState& state);
 
@@ -35,7 +35,7 @@ class RecordedTouch final : public display::TouchSource {
  public:
   /// \throws MeshError
   RecordedTouch(std::string scene_path, protocols::SceneSpec spec,
-                const rendering::Renderer& renderer, std::vector<TimedPose> poses);
+                const rendering::Renderer& renderer, std::vector<touch::TimedPose> poses);
 
   bool live() const override { return false; }
   void take(std::vector<display::SceneMoment>& out) override;
@@ -51,7 +51,7 @@ class RecordedTouch final : public display::TouchSource {
   std::string scene_path_;
   protocols::SceneSpec spec_;
   const rendering::Renderer& renderer_;
-  std::vector<TimedPose> poses_;
+  std::vector<touch::TimedPose> poses_;
   std::vector<display::SceneMoment> moments_;
   std::string trouble_;
 };

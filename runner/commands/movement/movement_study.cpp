@@ -11,12 +11,12 @@
 #include <vector>
 
 #include "data/base/text.h"
-#include "runner/commands/movement/touched_trial.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/outputs.h"
-#include "runner/commands/shared/progress_line.h"
-#include "runner/commands/shared/study_trials.h"
+#include "runner/movement/touched_trial.h"
+#include "runner/output/outputs.h"
+#include "runner/output/progress_line.h"
 #include "runner/session/replay.h"
+#include "runner/study/study_trials.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -27,14 +27,14 @@ struct TrialRow {
   std::string participant, renderer, shape;
   int session = 0, block = 0, trial = 0;
   bool correct = false, simulated = false;
-  MeasuredTrial measured;
+  movement::MeasuredTrial measured;
 };
 
 /// Reads the trials of a study, shared among threads: unpacking and rendering samples takes most of
 /// the time.
 class StudyReader {
  public:
-  StudyReader(const MovementRequest& request, StudyStimuli& stimuli, std::size_t trials)
+  StudyReader(const MovementRequest& request, movement::StudyStimuli& stimuli, std::size_t trials)
       : request_(request), stimuli_(stimuli), taken_(trials), rows_(trials) {}
 
   /// \throws UsageError: the database has changed meanwhile
@@ -42,7 +42,7 @@ class StudyReader {
     {
       std::vector<std::jthread> threads;
       for (int i = 1; i < request_.jobs; ++i) threads.emplace_back([this] { work(nullptr); });
-      ProgressLine progress("movement");
+      output::ProgressLine progress("movement");
       work(&progress);
     }
     if (failed_) std::rethrow_exception(failed_);
@@ -50,7 +50,7 @@ class StudyReader {
   }
 
  private:
-  void work(ProgressLine* progress) {
+  void work(output::ProgressLine* progress) {
     try {
       read_share(progress);
     } catch (...) {
@@ -59,7 +59,7 @@ class StudyReader {
   }
 
   /// Walks through all trials and takes those that no other thread has taken.
-  void read_share(ProgressLine* progress) {
+  void read_share(output::ProgressLine* progress) {
     data::Store store = data::Store::open(request_.database, data::Store::Mode::read_only);
     std::size_t index = 0;
     bool mine = false;
@@ -79,17 +79,17 @@ class StudyReader {
       const std::size_t at = index++;
       if (!mine) return;
       const data::TrialRecord& record = trial.record;
-      rows_[at] = {
-          key_of(trial),
-          trial.participant.code,
-          record.renderer,
-          record.shape,
-          record.session,
-          record.block,
-          record.trial,
-          record.correct,
-          trial.participant.simulated,
-          measure_trial(*stimuli_.of(store, trial), trial, request_.settings, request_.pictures)};
+      rows_[at] = {key_of(trial),
+                   trial.participant.code,
+                   record.renderer,
+                   record.shape,
+                   record.session,
+                   record.block,
+                   record.trial,
+                   record.correct,
+                   trial.participant.simulated,
+                   movement::measure_trial(*stimuli_.of(store, trial), trial, request_.settings,
+                                           request_.pictures)};
       const std::size_t done = ++done_;
       if (progress) progress->show(static_cast<double>(done) / static_cast<double>(rows_.size()));
     };
@@ -99,7 +99,7 @@ class StudyReader {
   }
 
   const MovementRequest& request_;
-  StudyStimuli& stimuli_;
+  movement::StudyStimuli& stimuli_;
   std::vector<std::atomic<bool>> taken_;
   std::vector<TrialRow> rows_;
   std::atomic<std::size_t> done_{0};
@@ -124,7 +124,8 @@ std::string csv_field(const std::string& text) {
   return quoted + "\"";
 }
 
-void put_row(CsvText& csv, const TrialRow& one, const analysis::MovementSettings& settings) {
+void put_row(output::CsvText& csv, const TrialRow& one,
+             const analysis::MovementSettings& settings) {
   csv << one.participant << one.session << one.block << one.trial << one.renderer << one.shape
       << one.correct << one.simulated << settings.cutoff << one.measured.ticks;
   for (const auto& value : one.measured.values) {
@@ -138,7 +139,7 @@ void put_row(CsvText& csv, const TrialRow& one, const analysis::MovementSettings
 }
 
 /// Reads the typical trials again, and the surfaces of their objects.
-void add_pictures(const MovementRequest& request, StudyStimuli& stimuli,
+void add_pictures(const MovementRequest& request, movement::StudyStimuli& stimuli,
                   const std::vector<TrialRow>& rows, MovementStudy& study) {
   analysis::MovementPictures& pictures = study.pictures;
   pictures.outlines.resize(study.table.trials.shapes.size());
@@ -147,9 +148,9 @@ void add_pictures(const MovementRequest& request, StudyStimuli& stimuli,
     const data::TrialName name{rows[at].participant, rows[at].session, rows[at].trial};
     for (const data::StoredTrial& stored : store.attempts(name)) {
       if (!stored.cut_off_reason.empty() || key_of(stored) != rows[at].key) continue;
-      const std::shared_ptr<const TouchedStimuli> touched = stimuli.of(store, stored);
+      const std::shared_ptr<const movement::TouchedStimuli> touched = stimuli.of(store, stored);
       analysis::TypicalTrial typical{at, session::to_string(name), {}};
-      if (!read_movement(*touched, stored, typical.trial).empty()) continue;
+      if (!movement::read_movement(*touched, stored, typical.trial).empty()) continue;
       pictures.typical.push_back(std::move(typical));
       analysis::ShapeOutline& outline = pictures.outlines[study.table.trials.rows[at].shape];
       const int stimulus = touched->stimulus(stored.record.shape);
@@ -180,10 +181,10 @@ void require_samples(const MovementStudy& study, const std::string& database) {
 
 MovementStudy measure_study(const MovementRequest& request) {
   MovementStudy study;
-  study.table.trials = read_study_trials(request.database, "", request.protocol);
+  study.table.trials = study::read_study_trials(request.database, "", request.protocol);
   study.table.settings = request.settings;
-  CsvText csv(columns(), "\n");
-  StudyStimuli stimuli(request.mesh_folder);
+  output::CsvText csv(columns(), "\n");
+  movement::StudyStimuli stimuli(request.mesh_folder);
   StudyReader reader(request, stimuli, study.table.trials.rows.size());
   const std::vector<TrialRow>& rows = reader.read();
   for (const TrialRow& one : rows) {

@@ -23,9 +23,9 @@
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/outputs.h"
-#include "runner/commands/shared/progress_line.h"
-#include "runner/commands/shared/study_trials.h"
+#include "runner/output/outputs.h"
+#include "runner/output/progress_line.h"
+#include "runner/study/study_trials.h"
 
 namespace palpate::runner::commands {
 
@@ -55,12 +55,13 @@ void add_threshold_options(CommandLine& line, ThresholdOptions& options);
 /// Prints the plan, and writes its JSON. \throws UsageError
 void plan_thresholds_of(const ThresholdOptions& thresholds, const MeasureOption& measure,
                         const PlanOptions& options,
-                        const boost::program_options::variables_map& values, Outputs& outputs);
+                        const boost::program_options::variables_map& values,
+                        output::Outputs& outputs);
 
 /// Prints how often the intervals of thresholds contain the true value, and writes its JSON.
 /// \throws UsageError
 void print_coverage(const PlanOptions& options, const boost::program_options::variables_map& values,
-                    Outputs& outputs);
+                    output::Outputs& outputs);
 
 namespace po = boost::program_options;
 
@@ -216,8 +217,9 @@ void add_plan_options(CommandLine& line, PlanOptions& options) {
 /// The times of a pilot, which may be of a protocol with tasks. \throws UsageError
 analysis::TrialTable pilot_trials(const PlanOptions& options) {
   const auto& [database, csv, protocol] = std::tie(options.database, options.csv, options.protocol);
-  if (!is_of_tasks(database, csv, protocol)) return read_study_trials(database, csv, protocol);
-  const analysis::TaskTable tasks = read_study_tasks(database, csv, protocol);
+  if (!study::is_of_tasks(database, csv, protocol))
+    return study::read_study_trials(database, csv, protocol);
+  const analysis::TaskTable tasks = study::read_study_tasks(database, csv, protocol);
   if (auto times = analysis::identification_of(tasks)) return std::move(*times);
   throw UsageError(printable(tasks.source) +
                    ": expected a pilot in which stimuli are identified; plan --jnd-effect is for "
@@ -453,7 +455,8 @@ void add_threshold_options(CommandLine& line, ThresholdOptions& options) {
       "--seed, --jobs, --json");
 }
 
-void print_coverage(const PlanOptions& options, const po::variables_map& values, Outputs& outputs) {
+void print_coverage(const PlanOptions& options, const po::variables_map& values,
+                    output::Outputs& outputs) {
   for (const char* other :
        {"db", "csv", "effect", "gain-sd", "residual-sd", "figure", "reuse", "jnd-effect"}) {
     if (values.count(other))
@@ -473,7 +476,7 @@ void print_coverage(const PlanOptions& options, const po::variables_map& values,
   settings.studies = studies;
   settings.seed = asked.seed;
   settings.jobs = asked.jobs;
-  ProgressLine progress("simulated studies");
+  output::ProgressLine progress("simulated studies");
   settings.progress = [&progress](double share) { progress.show(share); };
   const auto results = analysis::interval_coverage(settings);
   progress.begin("simulated studies of groups");
@@ -493,7 +496,7 @@ void print_coverage(const PlanOptions& options, const po::variables_map& values,
 
 void plan_thresholds_of(const ThresholdOptions& thresholds, const MeasureOption& measure,
                         const PlanOptions& options, const po::variables_map& values,
-                        Outputs& outputs) {
+                        output::Outputs& outputs) {
   for (const char* other : {"db", "csv", "effect", "gain-sd", "residual-sd", "figure", "reuse"}) {
     if (values.count(other))
       throw UsageError(std::string("--") + other + ": is of response times; not with --" +
@@ -514,7 +517,7 @@ void plan_thresholds_of(const ThresholdOptions& thresholds, const MeasureOption&
   settings.seed = own.seed;
   settings.power = own.power;
   std::sort(settings.trials.begin(), settings.trials.end());
-  ProgressLine progress("simulated studies");
+  output::ProgressLine progress("simulated studies");
   settings.progress = [&progress](double share) { progress.show(share); };
   const analysis::ThresholdPlan plan = analysis::plan_thresholds(study, std::move(settings));
   progress.clear();
@@ -576,7 +579,7 @@ int plan_command(const std::vector<std::string>& args) {
   }
   if (values->count("protocol") && !values->count("db") && !values->count("csv"))
     throw UsageError("--protocol: is one of a pilot; give --db FILE or --csv FILE");
-  Outputs outputs(*values, {"json", "figure"}, {"db", "csv"});
+  output::Outputs outputs(*values, {"json", "figure"}, {"db", "csv"});
   if (values->count("coverage")) {
     print_coverage(options, *values, outputs);
     return 0;
@@ -602,7 +605,7 @@ int plan_command(const std::vector<std::string>& args) {
 
   const std::string curves = std::to_string(settings.trials.size());
   const auto studies = static_cast<double>(settings.simulation.studies);
-  ProgressLine progress("curve 1 of " + curves);
+  output::ProgressLine progress("curve 1 of " + curves);
   settings.simulation.progress = [&progress, studies](std::size_t done) {
     progress.show(static_cast<double>(done) / studies);
   };

@@ -26,17 +26,17 @@
 #include "protocols/parse.h"
 #include "protocols/protocol.h"
 #include "runner/build_info.h"
-#include "runner/commands/register/answers.h"
-#include "runner/commands/register/planned_conditions.h"
-#include "runner/commands/register/planned_studies.h"
-#include "runner/commands/register/registration.h"
-#include "runner/commands/register/registration_text.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/progress_line.h"
-#include "runner/commands/shared/sealed_folder.h"
-#include "runner/commands/shared/study_order.h"
+#include "runner/output/progress_line.h"
 #include "runner/participants/simulated_settings.h"
+#include "runner/registration/answers.h"
+#include "runner/registration/planned_conditions.h"
+#include "runner/registration/planned_studies.h"
+#include "runner/registration/registration.h"
+#include "runner/registration/registration_text.h"
+#include "runner/registration/sealed_folder.h"
 #include "runner/session/run_record.h"
+#include "runner/study/study_order.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -102,10 +102,11 @@ hypotheses.json:
   const auto values = line.parse(args);
   if (!values) return std::nullopt;
   options.protocol = (*values)["PROTOCOL.json"].as<std::string>();
-  if (values->count("participants") &&
-      (options.participants < kFewestParticipants || options.participants > kMostParticipants))
-    throw UsageError("--participants: must be 2 to " + std::to_string(kMostParticipants));
-  if (!(options.too_fast > 0 && options.too_fast <= kMostTooFast))
+  if (values->count("participants") && (options.participants < registration::kFewestParticipants ||
+                                        options.participants > registration::kMostParticipants))
+    throw UsageError("--participants: must be 2 to " +
+                     std::to_string(registration::kMostParticipants));
+  if (!(options.too_fast > 0 && options.too_fast <= registration::kMostTooFast))
     throw UsageError("--too-fast-s: must be above 0, at most 60 s");
   if (values->count("studies")) options.studies = studies;
   if (options.studies && (*options.studies < 20 || *options.studies > 100'000))
@@ -116,30 +117,32 @@ hypotheses.json:
 
 /// Refuses to replace a registration that the lab has filled in.
 void require_replaceable(const RegisterOptions& options) {
-  require_replaceable_folder(options.out, options.force, kMark, files_to_fill_in());
+  registration::require_replaceable_folder(options.out, options.force, kMark,
+                                           registration::files_to_fill_in());
   if (!options.force || !fs::exists(fs::path(options.out) / kMark)) return;
-  for (const std::string& file : filled_in(options.out, read_registration(options.out)).files)
+  for (const std::string& file :
+       registration::filled_in(options.out, registration::read_registration(options.out)).files)
     throw UsageError(printable(options.out) + ": " + file +
                      " has been filled in and would be lost; name another folder");
 }
 
 protocols::Protocol read_protocol(const std::string& path) {
   protocols::Protocol protocol = protocols::parse_protocol(path);
-  require_registrable(protocol, path);
+  registration::require_registrable(protocol, path);
   return protocol;
 }
 
 analysis::PlanRecord read_fitting_plan(const std::string& path, const std::string& text,
                                        const protocols::Protocol& protocol) {
   analysis::PlanRecord plan = analysis::read_plan(text, path);
-  require_fitting(plan, path, protocol);
+  registration::require_fitting(plan, path, protocol);
   return plan;
 }
 
-std::size_t sample_size(const RegisterOptions& options, const Registration& made) {
+std::size_t sample_size(const RegisterOptions& options, const registration::Registration& made) {
   if (options.participants > 0) return options.participants;
-  if (const auto& needed = fitting_curve(made.protocol, made.plan).participants) {
-    if (*needed >= 2 && *needed <= kMostParticipants) return *needed;
+  if (const auto& needed = registration::fitting_curve(made.protocol, made.plan).participants) {
+    if (*needed >= 2 && *needed <= registration::kMostParticipants) return *needed;
   }
   throw UsageError(options.plan +
                    ": no number of participants reaches the wanted power; say with --participants "
@@ -164,9 +167,10 @@ std::string share_text(std::size_t n, std::size_t of) {
          analysis::fixed(100 * ends.low, 0) + " to " + analysis::fixed(100 * ends.high, 0) + " %)";
 }
 
-void warn_of_hypothesis(const analysis::Hypothesis& one, const Rehearsal& rehearsal,
+void warn_of_hypothesis(const analysis::Hypothesis& one, const registration::Rehearsal& rehearsal,
                         double wanted_power, std::vector<std::string>& out) {
-  const VerdictCounts &with = rehearsal.with_effect, &without = rehearsal.without_effect;
+  const registration::VerdictCounts &with = rehearsal.with_effect,
+                                    &without = rehearsal.without_effect;
   const std::size_t all = with.studies() + without.studies();
   for (const auto& [n, words] :
        {std::pair{with.corroborated + without.corroborated, "corroborated"},
@@ -189,9 +193,9 @@ void warn_of_hypothesis(const analysis::Hypothesis& one, const Rehearsal& rehear
                   analysis::fixed(100 * wanted_power, 0) + " %.");
 }
 
-std::vector<std::string> warnings_of(const Registration& made) {
+std::vector<std::string> warnings_of(const registration::Registration& made) {
   std::vector<std::string> out;
-  const auto& curve = fitting_curve(made.protocol, made.plan);
+  const auto& curve = registration::fitting_curve(made.protocol, made.plan);
   const auto power = curve.power.find(made.participants);
   if (!curve.participants) {
     out.push_back("The plan reaches its power with no number of participants in its range.");
@@ -202,7 +206,7 @@ std::vector<std::string> warnings_of(const Registration& made) {
                        ? "."
                        : ", with a power of " + analysis::fixed(100 * power->second, 0) + " %."));
   }
-  const auto orders = static_cast<std::size_t>(condition_orders(made.protocol));
+  const auto orders = static_cast<std::size_t>(study::condition_orders(made.protocol));
   const bool tasks = !made.protocol.blocks.empty();
   if (made.participants % orders != 0)
     out.push_back(std::string("The orders of the ") + (tasks ? "blocks" : "renderers") +
@@ -211,7 +215,7 @@ std::vector<std::string> warnings_of(const Registration& made) {
   if (!made.plan.pilot_label.empty())
     out.push_back("The plan rests on " + made.plan.pilot_label +
                   ": their standard deviations are a model's.");
-  if (tasks && !conditions_of(made.protocol, made.plan).differ)
+  if (tasks && !registration::conditions_of(made.protocol, made.plan).differ)
     out.emplace_back(
         "The plan is of a difference between two conditions; the protocol has one. The simulated "
         "studies with the planned effect and with none are alike.");
@@ -222,45 +226,50 @@ std::vector<std::string> warnings_of(const Registration& made) {
 
 /// Writes simulated studies, their analyses and their verdicts on the hypotheses.
 void put_simulated(const RegisterOptions& options, const data::AtomicFolder& draft,
-                   Registration& made) {
+                   registration::Registration& made) {
   constexpr const char* kEffect = "simulated/planned-effect.csv";
   constexpr const char* kNone = "simulated/no-effect.csv";
-  const std::unique_ptr<PlannedStudies> studies = planned_studies(made);
+  const std::unique_ptr<registration::PlannedStudies> studies = registration::planned_studies(made);
   const std::string scratch = draft / "scratch";
   studies->write(scratch, draft.prepare(kEffect), draft / "codebook.csv", true);
   fs::remove_all(scratch);
   studies->write(scratch, draft.prepare(kNone), "", false);
   fs::remove_all(scratch);
-  write_member(draft, "simulated/README.md",
-               "# SIMULATED data\n\n" + study_answers(made)->simulated() + "\n");
+  registration::write_member(
+      draft, "simulated/README.md",
+      "# SIMULATED data\n\n" + registration::study_answers(made)->simulated() + "\n");
   const std::string with = studies->analyzed(draft / kEffect, kEffect);
   const std::string none = studies->analyzed(draft / kNone, kNone);
-  write_member(draft, "analysis-simulated.json",
-               nlohmann::ordered_json{{"planned_effect", read_ordered_json(with)},
-                                      {"no_effect", read_ordered_json(none)}}
-                       .dump(2) +
-                   "\n");
+  registration::write_member(draft, "analysis-simulated.json",
+                             nlohmann::ordered_json{{"planned_effect", read_ordered_json(with)},
+                                                    {"no_effect", read_ordered_json(none)}}
+                                     .dump(2) +
+                                 "\n");
   made.hypotheses = analysis::read_hypotheses(made.hypotheses_text, options.hypotheses,
                                               analysis::named_results(with, made.alpha));
-  ProgressLine line("simulated studies");
-  made.rehearsals = rehearse(*studies, made, options.studies.value_or(usual_studies(made.protocol)),
-                             options.jobs, [&](double share) { line.show(share); });
+  output::ProgressLine line("simulated studies");
+  made.rehearsals = registration::rehearse(
+      *studies, made, options.studies.value_or(registration::usual_studies(made.protocol)),
+      options.jobs, [&](double share) { line.show(share); });
   line.clear();
 }
 
 /// Sets the digest.
-void write_registration(const data::AtomicFolder& draft, Registration& made) {
-  write_member(draft, "protocol.json", made.protocol.source_text);
-  for (const data::ProtocolFile& file : made.files) write_member(draft, file.name, file.bytes);
-  write_member(draft, "plan.json", made.plan_text);
-  write_member(draft, "hypotheses.json", made.hypotheses_text);
-  const Form form = registration_form(made);
-  write_member(draft, "form.json", form_json(form));
-  write_member(draft, "registration.json", registration_json(made));
-  write_checksums(draft, files_to_fill_in());
-  made.digest = registration_digest(draft / "");
-  write_member(draft, files_to_fill_in()[0], markdown_as_made(form, made.digest));
-  write_member(draft, files_to_fill_in()[1], osf_as_made(form, made.digest));
+void write_registration(const data::AtomicFolder& draft, registration::Registration& made) {
+  registration::write_member(draft, "protocol.json", made.protocol.source_text);
+  for (const data::ProtocolFile& file : made.files)
+    registration::write_member(draft, file.name, file.bytes);
+  registration::write_member(draft, "plan.json", made.plan_text);
+  registration::write_member(draft, "hypotheses.json", made.hypotheses_text);
+  const registration::Form form = registration::registration_form(made);
+  registration::write_member(draft, "form.json", registration::form_json(form));
+  registration::write_member(draft, "registration.json", registration::registration_json(made));
+  registration::write_checksums(draft, registration::files_to_fill_in());
+  made.digest = registration::registration_digest(draft / "");
+  registration::write_member(draft, registration::files_to_fill_in()[0],
+                             registration::markdown_as_made(form, made.digest));
+  registration::write_member(draft, registration::files_to_fill_in()[1],
+                             registration::osf_as_made(form, made.digest));
 }
 
 }  // namespace
@@ -269,10 +278,10 @@ int register_command(const std::vector<std::string>& args) {
   const std::optional<RegisterOptions> given = parse_options(args);
   if (!given) return 0;
   const RegisterOptions& options = *given;
-  Registration made;
+  registration::Registration made;
   made.protocol = read_protocol(options.protocol);
   made.files = session::info_of(made.protocol).files;
-  require_files_below(made.files);
+  registration::require_files_below(made.files);
   made.plan_text = protocols::read_text_file(options.plan);
   made.plan = read_fitting_plan(options.plan, made.plan_text, made.protocol);
   made.hypotheses_text = protocols::read_text_file(options.hypotheses);
@@ -289,11 +298,11 @@ int register_command(const std::vector<std::string>& args) {
   made.too_fast = options.too_fast;
   made.alpha = made.plan.alpha;
   made.seed = options.seed;
-  made.typical_time = typical_time(made.protocol, made.too_fast);
+  made.typical_time = registration::typical_time(made.protocol, made.too_fast);
   made.participant_version = participants::kDefaultParticipantVersion;
   made.participant_sha256 = participants::load_simulated_settings("").sha256;
   for (std::size_t p = 1; p <= made.participants; ++p)
-    made.order_sha256.push_back(order_checksum(made.protocol, static_cast<int>(p)));
+    made.order_sha256.push_back(study::order_checksum(made.protocol, static_cast<int>(p)));
 
   data::AtomicFolder draft(options.out);
   put_simulated(options, draft, made);

@@ -15,11 +15,11 @@
 #include "protocols/parse.h"
 #include "rendering/bodies/moving_scene.h"
 #include "rendering/bodies/soft/soft_scene.h"
-#include "rendering/verification/explain.h"
-#include "runner/commands/render/forces.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/outputs.h"
-#include "runner/commands/shared/scene_notes.h"
+#include "runner/evidence/verification/explain.h"
+#include "runner/output/outputs.h"
+#include "runner/touch/forces.h"
+#include "runner/touch/scene_notes.h"
 #include "stimuli/parts/convex_parts.h"
 
 namespace palpate::runner::commands {
@@ -28,7 +28,7 @@ namespace palpate::runner::commands {
 
 /// A stage with its cost on this machine.
 struct StageCost {
-  rendering::TickStage stage;
+  evidence::TickStage stage;
   /// ns for a call, run in isolation over recorded ticks; empty: left out, did not happen, or
   /// cannot be separated from others.
   std::optional<double> ns;
@@ -51,7 +51,7 @@ nlohmann::ordered_json to_json(const Explanation& explanation);
 namespace {
 
 /// ns for a call: the least of several runs, each long enough for the clock.
-double cost_of(const rendering::StageTiming& timing) {
+double cost_of(const evidence::StageTiming& timing) {
   constexpr int kRuns = 15;
   constexpr std::chrono::milliseconds kLong{1};
   volatile double sink = 0;
@@ -82,8 +82,8 @@ std::string nanoseconds(const std::optional<double>& ns) {
 /// Fraction of the whole tick in contact, where the stage is part of it.
 std::optional<double> share_of_contact(const Explanation& e, const StageCost& cost) {
   if (!cost.ns || !e.contact_ns) return std::nullopt;
-  if (cost.stage.time != rendering::StageTime::tick &&
-      cost.stage.time != rendering::StageTime::contact)
+  if (cost.stage.time != evidence::StageTime::tick &&
+      cost.stage.time != evidence::StageTime::contact)
     return std::nullopt;
   return *cost.ns / *e.contact_ns;
 }
@@ -108,7 +108,7 @@ StageCost soft_stage(const rendering::SoftObject& object) {
                 "gives by its compliance",
                 object.object, mesh.nodes.size(), mesh.hexahedra.size() + mesh.tetrahedra.size(),
                 1 / body.settings().step);
-  return {{"soft body", rendering::StageTime::tick, true, text}, std::nullopt};
+  return {{"soft body", evidence::StageTime::tick, true, text}, std::nullopt};
 }
 
 /// The cost of bodies beside the contact law, with all of them in motion and the probe far away.
@@ -128,7 +128,7 @@ StageCost bodies_stage(const rendering::Scene& scene, const rendering::Renderer&
        << " stand still; " << moving.part_pairs << " pairs of convex parts may meet; "
        << 1e-3 * took.count() / kTicks
        << " us a tick over the first half second without the probe; what rests sleeps";
-  return {{"moving bodies", rendering::StageTime::tick, true, text.str()}, std::nullopt};
+  return {{"moving bodies", evidence::StageTime::tick, true, text.str()}, std::nullopt};
 }
 
 }  // namespace
@@ -153,7 +153,7 @@ Explanation explain_with_costs(const rendering::Scene& scene, const rendering::R
   std::map<std::string, double> costs;
   const auto soft = rendering::soft_objects(scene);
   if (soft.empty()) {  // else the stages are a scene's within, whose parts are not the ones shown
-    for (const rendering::StageTiming& timing : rendering::stage_timings(scene, renderer)) {
+    for (const evidence::StageTiming& timing : evidence::stage_timings(scene, renderer)) {
       if (timing.calls > 0) costs[timing.name] = cost_of(timing);
     }
   }
@@ -162,9 +162,9 @@ Explanation explain_with_costs(const rendering::Scene& scene, const rendering::R
     if (found == costs.end()) return std::nullopt;
     return found->second;
   };
-  explanation.contact_ns = cost(rendering::kTickInContact);
-  explanation.free_ns = cost(rendering::kTickInFreeSpace);
-  for (rendering::TickStage& stage : rendering::explain(scene, renderer)) {
+  explanation.contact_ns = cost(evidence::kTickInContact);
+  explanation.free_ns = cost(evidence::kTickInFreeSpace);
+  for (evidence::TickStage& stage : evidence::explain(scene, renderer)) {
     StageCost with{std::move(stage), std::nullopt};
     if (with.stage.runs) with.ns = cost(with.stage.name);
     explanation.stages.push_back(std::move(with));
@@ -196,7 +196,7 @@ std::string to_text(const Explanation& e) {
   for (const StageCost& c : e.stages) {
     std::string line = c.stage.name;
     pad(line, 25);
-    line += c.stage.runs ? rendering::to_string(c.stage.time) : "left out";
+    line += c.stage.runs ? evidence::to_string(c.stage.time) : "left out";
     const std::string ns = nanoseconds(c.ns), part = percent(share_of_contact(e, c));
     pad(line, 49 - ns.size());
     line += ns;
@@ -228,7 +228,7 @@ nlohmann::ordered_json to_json(const Explanation& e) {
   Json stages = Json::array();
   for (const StageCost& c : e.stages) {
     stages.push_back({{"stage", c.stage.name},
-                      {"when", rendering::to_string(c.stage.time)},
+                      {"when", evidence::to_string(c.stage.time)},
                       {"runs", c.stage.runs},
                       {"why", c.stage.why},
                       {"ns", figure(c.ns)},
@@ -270,16 +270,16 @@ void add_overlaps(const stimuli::ObjectSpec& object, const std::string& pointer,
     notes.push_back(pointer + " (" + printable(object.file_name) + "): " + printable(overlap));
 }
 
-void explain_scene(Outputs& outputs, const std::string& path, const protocols::SceneSpec& spec,
-                   const rendering::Renderer& renderer) {
+void explain_scene(output::Outputs& outputs, const std::string& path,
+                   const protocols::SceneSpec& spec, const rendering::Renderer& renderer) {
   SceneBuilder builder;
-  const rendering::Scene scene = build_scene(builder, path, spec, renderer);
+  const rendering::Scene scene = touch::build_scene(builder, path, spec, renderer);
   Explanation explanation = explain_with_costs(scene, renderer);
   for (std::size_t i = 0; i < spec.objects.size(); ++i) {
     if (!spec.objects[i].soft)
       add_overlaps(spec.objects[i], "/objects/" + std::to_string(i), builder, explanation.notes);
   }
-  for (std::string& note : scene_notes(spec, scene, builder))
+  for (std::string& note : touch::scene_notes(spec, scene, builder))
     explanation.notes.push_back(std::move(note));
   std::cout << to_text(explanation);
   outputs.put("json", to_json(explanation).dump(2) + "\n");
@@ -307,9 +307,9 @@ int render_command(const std::vector<std::string>& args) {
        "scene, JSON; or a mesh file, alone")                                                  //
       ("renderer", po::value<std::string>()->required()->value_name("NAME"), "point or ray")  //
       ("trajectory", po::value<std::string>()->value_name("FILE"),
-       (std::string("path of the stylus, CSV with the columns ") + kTrajectoryHeader +
-        " (s, m), and for a tool's +x " + (kSideHeader + 1) + "; at most " +
-        std::to_string(kMostPoses) + " rows")
+       (std::string("path of the stylus, CSV with the columns ") + touch::kTrajectoryHeader +
+        " (s, m), and for a tool's +x " + (touch::kSideHeader + 1) + "; at most " +
+        std::to_string(touch::kMostPoses) + " rows")
            .c_str())                                                        //
       ("out", po::value<std::string>()->value_name("FILE"), "forces, CSV")  //
       ("bodies", po::value<std::string>()->value_name("FILE"),
@@ -320,14 +320,15 @@ int render_command(const std::vector<std::string>& args) {
       ("force", "replace an existing file");
   const auto values = line.parse(args);
   if (!values) return 0;
-  const rendering::Renderer& renderer = renderer_named((*values)["renderer"].as<std::string>());
+  const rendering::Renderer& renderer =
+      touch::renderer_named((*values)["renderer"].as<std::string>());
   const bool explains = (*values)["explain"].as<bool>();
   if (explains &&
       (values->count("trajectory") > 0 || values->count("out") > 0 || values->count("bodies") > 0))
     throw UsageError("--explain renders nothing: leave out --trajectory, --out and --bodies");
   if (!explains && values->count("json") > 0) throw UsageError("--json goes with --explain");
   const std::string scene_path = (*values)["scene"].as<std::string>();
-  Outputs outputs(*values, {"out", "bodies", "json"}, {"scene", "trajectory"});
+  output::Outputs outputs(*values, {"out", "bodies", "json"}, {"scene", "trajectory"});
   if (explains) {
     const protocols::SceneSpec spec = protocols::parse_scene(scene_path);
     for (const stimuli::ObjectSpec& object : spec.objects) outputs.protect(object);
@@ -338,21 +339,21 @@ int render_command(const std::vector<std::string>& args) {
   given(*values, "out", "unless --explain is given");
   const protocols::SceneSpec spec = protocols::parse_scene(scene_path);
   for (const stimuli::ObjectSpec& object : spec.objects) outputs.protect(object);
-  const std::vector<TimedPose> poses = read_trajectory(trajectory);
+  const std::vector<touch::TimedPose> poses = touch::read_trajectory(trajectory);
   SceneBuilder builder;
-  const rendering::Scene scene = build_scene(builder, scene_path, spec, renderer);
-  ForceTable table(scene.tool() != nullptr);
-  BodyTable bodies;
-  render_along(scene, spec, renderer, poses,
-               [&](const TimedPose& pose, const rendering::Rendering& rendering,
-                   const rendering::RenderState& state) {
-                 table.add(pose, rendering);
-                 if (values->count("bodies") > 0) bodies.add(pose.t, state.motion.bodies());
-               });
+  const rendering::Scene scene = touch::build_scene(builder, scene_path, spec, renderer);
+  touch::ForceTable table(scene.tool() != nullptr);
+  touch::BodyTable bodies;
+  touch::render_along(scene, spec, renderer, poses,
+                      [&](const touch::TimedPose& pose, const rendering::Rendering& rendering,
+                          const rendering::RenderState& state) {
+                        table.add(pose, rendering);
+                        if (values->count("bodies") > 0) bodies.add(pose.t, state.motion.bodies());
+                      });
   outputs.put("out", table.text());
   outputs.put("bodies", bodies.text());
   outputs.write();
-  for (const std::string& note : scene_notes(spec, scene, builder))
+  for (const std::string& note : touch::scene_notes(spec, scene, builder))
     std::cerr << printable(scene_path) << ": " << note << '\n';
   std::cerr << printable_lines(table.warnings(trajectory));
   return 0;

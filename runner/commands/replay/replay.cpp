@@ -10,7 +10,7 @@
 #include "data/base/text.h"
 #include "data/store/store.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/outputs.h"
+#include "runner/output/outputs.h"
 
 namespace palpate::runner::commands {
 
@@ -245,7 +245,7 @@ int replay_command(const std::vector<std::string>& args) {
   add("force", "replace existing files");
   const auto values = line.parse(args);
   if (!values) return 0;
-  Outputs outputs(*values, {"out", "json"}, {"db"});
+  output::Outputs outputs(*values, {"out", "json"}, {"db"});
   const data::TrialName name = parse_trial_name(trial);
   data::Store store = data::Store::open(db, data::Store::Mode::read_only);
   const session::RecordedTrial recorded =

@@ -12,17 +12,17 @@
 #include "data/files/atomic_file.h"
 #include "data/store/store.h"
 #include "protocols/json_document.h"
-#include "runner/commands/render/forces.h"
 #include "runner/commands/run/admission.h"
 #include "runner/commands/run/opening.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/watch/trial_page.h"
 #include "runner/safety/fault_signals.h"
 #include "runner/serve/network.h"
 #include "runner/serve/served_scene.h"
 #include "runner/serve/served_session.h"
 #include "runner/servo/realtime.h"
 #include "runner/session/device_check.h"
+#include "runner/touch/forces.h"
+#include "runner/touch/trial_page.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -34,7 +34,8 @@ std::string picture_of(const std::vector<stimuli::ObjectSpec>& objects) {
   constexpr std::size_t kMostTriangles = 6000;  // of all
   nlohmann::ordered_json out = nlohmann::ordered_json::array();
   for (const stimuli::ObjectSpec& object : objects) {
-    const PictureMesh mesh = picture_mesh(object, kMostTriangles / objects.size() + 1);
+    const touch::PictureMesh mesh =
+        touch::picture_mesh(object, kMostTriangles / objects.size() + 1);
     nlohmann::ordered_json corners = nlohmann::ordered_json::array();
     for (const Vec3& corner : mesh.corners) {
       const Vec3 p = object.pose.position + object.pose.orientation * corner;
@@ -191,7 +192,7 @@ class Server final : public serve::ServeOutput {
                                .socket = text_of(values, "socket"),
                                .token = token_,
                                .origins = {},
-                               .page = std::string(live_page())};
+                               .page = std::string(touch::live_page())};
     if (values.count("allow-origin") > 0)
       net.origins = values["allow-origin"].as<std::vector<std::string>>();
     return net;
@@ -242,7 +243,7 @@ int serve_scene(const po::variables_map& values, const RunSettings& run) {
 
   auto sinks = open_markers(run);
   safety::FaultSignals signals;
-  protocols::Protocol protocol = serve::protocol_of(spec, renderer_named("point"));
+  protocols::Protocol protocol = serve::protocol_of(spec, touch::renderer_named("point"));
   protocol.servo_rate = rate;
   const OpenDevice open = open_device(kind, run, protocol);  // forks: before there are threads
   signals.watch(open.guard);

@@ -8,11 +8,11 @@
 
 #include <boost/program_options.hpp>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 #include "data/store/store.h"
+#include "runner/usage_error.h"
 
 namespace palpate::runner::commands {
 
@@ -40,10 +40,6 @@ std::string shell_quoted(const std::string& text);
 
 /// The trial named by an option, "P03/1/12". \throws UsageError
 data::TrialName parse_trial_name(const std::string& text);
-
-class UsageError : public std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
 
 /// A command's options: parses them, checks numbers and prints --help.
 struct CommandLine {

@@ -5,17 +5,11 @@
 #include <optional>
 #include <string>
 
-#include "data/export/settings.h"
 #include "data/store/store.h"
 #include "protocols/difference.h"
 #include "protocols/protocol.h"
 
 namespace palpate::runner::commands {
-
-// Facts for exports that data/ does not know: protocols, meanings of fault bits, the version.
-
-/// Settings with these facts; the rest are defaults.
-data::ExportSettings export_settings();
 
 /// The protocol that a participant began with, if it differs from the named one.
 struct EarlierProtocol {

@@ -10,6 +10,7 @@
 #include "data/base/text.h"
 #include "runner/commands/shared/command.h"
 #include "runner/session/socket_advisor.h"
+#include "runner/study/simulation_limits.h"
 
 namespace palpate::runner::commands {
 
@@ -30,7 +31,7 @@ void add_study_options(CommandLine& line, StudyOptions& options) {
 }
 
 void check_study_options(const po::variables_map& values, StudyOptions& options) {
-  check_simulated_participants(options.participants);
+  study::check_simulated_participants(options.participants);
   check_participant_version(values, options.version);
   options.protocol = values["PROTOCOL.json"].as<std::string>();
 }
@@ -104,11 +105,6 @@ Shard parse_shard(const std::string& text,
   return {*k, *n};
 }
 
-void check_simulated_participants(int participants) {
-  if (participants < 1 || participants > 100000)
-    throw UsageError("--participants: must be 1 to 100000");
-}
-
 void add_participant_version(CommandLine& line, int& version) {
   line.options.add_options()(
       "participant-version", boost::program_options::value(&version)->value_name("1|2|3"),
@@ -139,17 +135,6 @@ int version_to_go_on_with(const std::set<int>& begun, const std::string& file) {
                  printable(file).c_str(), *begun.begin());
   }
   return *begun.begin();
-}
-
-session::LimitedForSimulation fit_to_simulation(protocols::Protocol& protocol,
-                                                const participants::SimulatedSettings& simulated) {
-  session::LimitedForSimulation limited = session::limit_for_simulation(protocol, simulated);
-  std::string reasons;
-  for (const std::string& fault :
-       session::simulation_faults(protocol, StimulusLibrary(protocol), simulated))
-    reasons += "\n" + fault;
-  if (!reasons.empty()) throw UsageError("this protocol cannot be simulated:" + reasons);
-  return limited;
 }
 
 }  // namespace palpate::runner::commands

@@ -6,10 +6,8 @@
 #include <set>
 #include <string>
 
-#include "protocols/protocol.h"
 #include "runner/commands/shared/command.h"
 #include "runner/participants/simulated_settings.h"
-#include "runner/session/simulated_study.h"
 
 namespace palpate::runner::commands {
 
@@ -49,8 +47,6 @@ Shard parse_shard(const std::string& text, const std::function<const char*(const
 
 // Checks before a study is simulated.
 
-/// \throws UsageError
-void check_simulated_participants(int participants);
 /// Adds --participant-version. Without the option `version` stays unchanged.
 void add_participant_version(CommandLine& line, int& version);
 /// \throws UsageError: the simulated participant has no such version
@@ -58,10 +54,5 @@ void check_participant_version(const boost::program_options::variables_map& valu
 /// The version for a file without an option: the only one in `begun`, the default if that is empty.
 /// \throws UsageError naming `file`: it has several
 int version_to_go_on_with(const std::set<int>& begun, const std::string& file);
-
-/// Limits the materials if the protocol asks for it. \throws UsageError: the simulated device or
-/// participant cannot do the protocol
-session::LimitedForSimulation fit_to_simulation(protocols::Protocol& protocol,
-                                                const participants::SimulatedSettings& simulated);
 
 }  // namespace palpate::runner::commands

@@ -19,11 +19,11 @@
 #include "analysis/report/html_page.h"
 #include "analysis/report/tables.h"
 #include "analysis/text.h"
-#include "runner/commands/accuracy/report.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/outputs.h"
-#include "runner/commands/shared/progress_line.h"
-#include "runner/stability/boundary.h"
+#include "runner/evidence/reports/accuracy_report.h"
+#include "runner/evidence/stability/boundary.h"
+#include "runner/output/outputs.h"
+#include "runner/output/progress_line.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -33,13 +33,13 @@ namespace {
 /// One curve of the map: the boundary over stiffness.
 struct BoundaryCurve {
   std::string panel, name;  ///< "rates", "0.5 kHz"
-  stability::LoopCase loop;
-  std::vector<stability::BoundaryPoint> points;
+  evidence::LoopCase loop;
+  std::vector<evidence::BoundaryPoint> points;
 };
 
 /// Largest stable stiffness of a device, without and with the passivity controller.
 struct ControllerGain {
-  stability::LoopCase loop;      ///< without the controller
+  evidence::LoopCase loop;       ///< without the controller
   double damping = 0;            ///< N s/m, of each end
   double without = 0, with = 0;  ///< N/m, largest stable stiffness
 };
@@ -48,7 +48,7 @@ struct StabilityReport {
   std::vector<BoundaryCurve> theory;  ///< heavy ends, as the theory assumes
   std::vector<BoundaryCurve> curves;
   std::vector<ControllerGain> gains;
-  std::vector<stability::IntegratorRow> integrators;
+  std::vector<evidence::IntegratorRow> integrators;
 
   /// Largest |measured / theory - 1| of the plain wall with heavy ends.
   double worst_disagreement() const;
@@ -88,18 +88,18 @@ void add_curve(analysis::Panel& panel, const BoundaryCurve& curve, std::size_t r
   constexpr double kApart = 9;  // px between symbols of curves on the lower edge
   const analysis::Role role = analysis::line_role(row);
   analysis::Mark theory = analysis::line_mark(role, {}, {}, 1.4);
-  for (const stability::BoundaryPoint& point : curve.points) {
+  for (const evidence::BoundaryPoint& point : curve.points) {
     const double x = std::log10(point.stiffness);
     if (point.promised) {
       theory.x.push_back(x);
       theory.y.push_back(std::log10(std::max(point.theory, kLeastDamping)));
     }
-    const std::string text = curve.name + ", " + significant(point.stiffness) + " N/m: ";
+    const std::string text = curve.name + ", " + evidence::significant(point.stiffness) + " N/m: ";
     if (point.measured > 0) {
       panel.marks.push_back(
           analysis::symbol(role, line_shape(row), x,
                            std::clamp(std::log10(point.measured), panel.y.low, panel.y.high), 3.5,
-                           text + significant(point.measured) + " N s/m"));
+                           text + evidence::significant(point.measured) + " N s/m"));
     } else {
       panel.marks.push_back(analysis::symbol(role, line_shape(row), x, panel.y.low, 3.5,
                                              text + "stable without any damping"));
@@ -111,7 +111,8 @@ void add_curve(analysis::Panel& panel, const BoundaryCurve& curve, std::size_t r
 
 /// "20 kPa", "1 MPa"
 std::string in_pascals(double modulus) {
-  return modulus < 1e6 ? significant(modulus / 1e3) + " kPa" : significant(modulus / 1e6) + " MPa";
+  return modulus < 1e6 ? evidence::significant(modulus / 1e3) + " kPa"
+                       : evidence::significant(modulus / 1e6) + " MPa";
 }
 
 /// Damping over stiffness, measured and by theory, a panel for each question.
@@ -150,12 +151,12 @@ analysis::Figure stability_figure(const StabilityReport& report) {
 }
 
 /// Swing of the force on soft bodies, by modulus, spring and rate, a panel for each tool.
-analysis::Figure soft_map_figure(const std::vector<stability::SoftSwing>& map) {
+analysis::Figure soft_map_figure(const std::vector<evidence::SoftSwing>& map) {
   constexpr double kCellWidth = 64, kCellHeight = 19;  // px
   analysis::Figure figure;
   figure.id = "soft-stability";
   int allowed = 0, settled = 0;
-  for (const stability::SoftSwing& one : map) {
+  for (const evidence::SoftSwing& one : map) {
     allowed += one.accepted;
     settled += one.accepted && one.settles();
   }
@@ -170,11 +171,11 @@ analysis::Figure soft_map_figure(const std::vector<stability::SoftSwing>& map) {
       "springs, columns the rate of the body's steps, numbers the swing of the force in percent.";
   figure.max_row_width = kRoom;
   std::vector<std::string> rates, rows;
-  for (const stability::SoftSwing& one : map) {
-    const stability::SoftCase& what = one.what;
-    const std::string title = "tool of " + significant(1000 * what.radius) + " mm, Poisson " +
-                              significant(what.poisson) + ", damping " +
-                              significant(1000 * what.damping) + " ms";
+  for (const evidence::SoftSwing& one : map) {
+    const evidence::SoftCase& what = one.what;
+    const std::string title = "tool of " + evidence::significant(1000 * what.radius) +
+                              " mm, Poisson " + evidence::significant(what.poisson) + ", damping " +
+                              evidence::significant(1000 * what.damping) + " ms";
     const auto slot = [](std::vector<std::string>& names, const std::string& name) {
       const auto at = std::find(names.begin(), names.end(), name) - names.begin();
       if (at == std::ssize(names)) names.push_back(name);
@@ -186,10 +187,10 @@ analysis::Figure soft_map_figure(const std::vector<stability::SoftSwing>& map) {
     }
     const std::string rate = analysis::fixed(what.rate, what.rate < 100 ? 1 : 0);
     const double x = slot(rates, rate),
-                 y = slot(rows, in_pascals(what.young) + ", " + significant(what.stiffness / 1000) +
-                                    " kN/m");
+                 y = slot(rows, in_pascals(what.young) + ", " +
+                                    evidence::significant(what.stiffness / 1000) + " kN/m");
     analysis::Panel& panel = figure.panels.back();
-    const std::string swing = one.finite ? significant(100 * one.swing) : "no number";
+    const std::string swing = one.finite ? evidence::significant(100 * one.swing) : "no number";
     // Rows are reversed once their number is known.
     panel.marks.push_back(analysis::rect_mark(
         one.accepted ? analysis::Role::point : analysis::Role::amber, x + 0.03, -y - 0.05, x + 0.97,
@@ -229,7 +230,7 @@ analysis::Figure integrator_figure(const StabilityReport& report) {
   for (std::size_t m = 0; m < kMethods.size(); ++m) {
     figure.legend.push_back({kMethods[m], analysis::line_role(m), line_shape(m)});
   }
-  for (const stability::IntegratorRow& row : report.integrators) {
+  for (const evidence::IntegratorRow& row : report.integrators) {
     if (!figure.panels.empty() && figure.panels.back().title == row.oscillator) continue;
     analysis::Panel panel;
     panel.title = row.oscillator;
@@ -242,7 +243,7 @@ analysis::Figure integrator_figure(const StabilityReport& report) {
   for (analysis::Panel& panel : figure.panels) {
     for (std::size_t m = 0; m < kMethods.size(); ++m) {
       analysis::Mark line = analysis::line_mark(analysis::line_role(m), {}, {}, 1.4);
-      for (const stability::IntegratorRow& row : report.integrators) {
+      for (const evidence::IntegratorRow& row : report.integrators) {
         if (row.oscillator != panel.title || row.method != kMethods[m]) continue;
         if (!std::isfinite(row.error)) continue;
         line.x.push_back(std::clamp(std::log10(row.ns_per_tick), panel.x.low, panel.x.high));
@@ -250,8 +251,9 @@ analysis::Figure integrator_figure(const StabilityReport& report) {
             std::clamp(std::log10(std::max(row.error, kLeastError)), panel.y.low, panel.y.high));
         panel.marks.push_back(analysis::symbol(
             analysis::line_role(m), line_shape(m), line.x.back(), line.y.back(), m == 3 ? 5 : 3.5,
-            row.method + ", " + std::to_string(row.steps) + " steps a tick: " +
-                significant(row.ns_per_tick) + " ns, error " + significant(row.error) + " m"));
+            row.method + ", " + std::to_string(row.steps) +
+                " steps a tick: " + evidence::significant(row.ns_per_tick) + " ns, error " +
+                evidence::significant(row.error) + " m"));
       }
       if (line.x.size() > 1) panel.marks.push_back(std::move(line));
     }
@@ -261,7 +263,7 @@ analysis::Figure integrator_figure(const StabilityReport& report) {
 
 using Json = nlohmann::ordered_json;
 
-std::string times(double factor) { return significant(factor) + " times"; }
+std::string times(double factor) { return evidence::significant(factor) + " times"; }
 
 analysis::Table theory_table(const StabilityReport& report) {
   analysis::Table table;
@@ -269,9 +271,10 @@ analysis::Table theory_table(const StabilityReport& report) {
       "The case of the theory: a plain wall, ends so heavy that their mass does not matter";
   table.header = {"curve", "stiffness N/m", "damping N s/m: theory", "measured", "ratio"};
   for (const BoundaryCurve& curve : report.theory) {
-    for (const stability::BoundaryPoint& p : curve.points) {
-      table.rows.push_back({curve.name, significant(p.stiffness), significant(p.theory),
-                            significant(p.measured), significant(p.measured / p.theory)});
+    for (const evidence::BoundaryPoint& p : curve.points) {
+      table.rows.push_back({curve.name, evidence::significant(p.stiffness),
+                            evidence::significant(p.theory), evidence::significant(p.measured),
+                            evidence::significant(p.measured / p.theory)});
     }
   }
   return table;
@@ -283,10 +286,10 @@ analysis::Table curve_table(const StabilityReport& report, const std::string& pa
   table.header = {"curve", "stiffness N/m", "theory", "measured"};
   for (const BoundaryCurve& curve : report.curves) {
     if (curve.panel != panel) continue;
-    for (const stability::BoundaryPoint& p : curve.points) {
-      table.rows.push_back({curve.name, significant(p.stiffness),
-                            p.promised ? significant(p.theory) : "no promise",
-                            p.measured == 0 ? "none" : significant(p.measured)});
+    for (const evidence::BoundaryPoint& p : curve.points) {
+      table.rows.push_back({curve.name, evidence::significant(p.stiffness),
+                            p.promised ? evidence::significant(p.theory) : "no promise",
+                            p.measured == 0 ? "none" : evidence::significant(p.measured)});
     }
   }
   return table;
@@ -309,12 +312,14 @@ analysis::Table gain_table(const StabilityReport& report) {
                   "delay", "theory", "without", "with",          "factor"};
   table.n_names = 2;
   for (const ControllerGain& g : report.gains) {
-    const stability::LoopSettings& s = g.loop.settings;
-    table.rows.push_back(
-        {stability::to_string(g.loop.contact_case), protocols::to_string(g.loop.renderer),
-         significant(s.rate), significant(g.damping), significant(1e6 * s.resolution),
-         std::to_string(s.delay), significant(g.damping * s.rate / (0.5 + s.delay)),
-         significant(g.without), significant(g.with), significant(g.with / g.without)});
+    const evidence::LoopSettings& s = g.loop.settings;
+    table.rows.push_back({evidence::to_string(g.loop.contact_case),
+                          protocols::to_string(g.loop.renderer), evidence::significant(s.rate),
+                          evidence::significant(g.damping),
+                          evidence::significant(1e6 * s.resolution), std::to_string(s.delay),
+                          evidence::significant(g.damping * s.rate / (0.5 + s.delay)),
+                          evidence::significant(g.without), evidence::significant(g.with),
+                          evidence::significant(g.with / g.without)});
   }
   return table;
 }
@@ -324,10 +329,11 @@ analysis::Table integrator_table(const StabilityReport& report) {
   table.caption = "Integrators of the hand, 1 kHz: error after 500 ticks over run time";
   table.header = {"case", "method", "steps a tick", "ns a tick", "worst error, m"};
   table.n_names = 2;
-  for (const stability::IntegratorRow& row : report.integrators) {
-    table.rows.push_back({row.oscillator, row.method, std::to_string(row.steps),
-                          significant(row.ns_per_tick),
-                          std::isfinite(row.error) ? significant(row.error) : "diverges"});
+  for (const evidence::IntegratorRow& row : report.integrators) {
+    table.rows.push_back(
+        {row.oscillator, row.method, std::to_string(row.steps),
+         evidence::significant(row.ns_per_tick),
+         std::isfinite(row.error) ? evidence::significant(row.error) : "diverges"});
   }
   return table;
 }
@@ -336,10 +342,10 @@ analysis::Table integrator_table(const StabilityReport& report) {
 /// exact one's; worst case.
 double integrator_gain(const StabilityReport& report) {
   double worst = HUGE_VAL;
-  for (const stability::IntegratorRow& exact : report.integrators) {
+  for (const evidence::IntegratorRow& exact : report.integrators) {
     if (exact.method != "exact") continue;
     double cheapest = HUGE_VAL;
-    for (const stability::IntegratorRow& row : report.integrators) {
+    for (const evidence::IntegratorRow& row : report.integrators) {
       if (row.oscillator == exact.oscillator && row.method != "exact" && row.error <= 1e-6) {
         cheapest = std::min(cheapest, row.ns_per_tick);
       }
@@ -377,9 +383,9 @@ Json reach_json(const std::optional<rendering::Reach>& reach) {
   return {{"factor", reach->factor}, {"pivot_share_of_stylus", reach->fraction}};
 }
 
-Json loop_json(const stability::LoopCase& loop) {
-  const stability::LoopSettings& s = loop.settings;
-  return {{"scene", stability::to_string(loop.contact_case)},
+Json loop_json(const evidence::LoopCase& loop) {
+  const evidence::LoopSettings& s = loop.settings;
+  return {{"scene", evidence::to_string(loop.contact_case)},
           {"renderer", protocols::to_string(loop.renderer)},
           {"rate_hz", s.rate},
           {"end_mass_kg", loop.heavy ? Json() : Json(s.mass)},
@@ -397,7 +403,7 @@ Json loop_json(const stability::LoopCase& loop) {
 Json curve_json(const BoundaryCurve& curve) {
   Json json = {{"panel", curve.panel}, {"name", curve.name}, {"loop", loop_json(curve.loop)}};
   json["points"] = Json::array();
-  for (const stability::BoundaryPoint& p : curve.points) {
+  for (const evidence::BoundaryPoint& p : curve.points) {
     json["points"].push_back({{"stiffness_n_per_m", p.stiffness},
                               {"measured_ns_per_m", p.measured},
                               {"theory_ns_per_m", p.theory},
@@ -409,7 +415,7 @@ Json curve_json(const BoundaryCurve& curve) {
 double StabilityReport::worst_disagreement() const {
   double worst = 0;
   for (const BoundaryCurve& curve : theory) {
-    for (const stability::BoundaryPoint& p : curve.points) {
+    for (const evidence::BoundaryPoint& p : curve.points) {
       worst = std::max(worst, std::abs(p.measured / p.theory - 1));
     }
   }
@@ -419,7 +425,7 @@ double StabilityReport::worst_disagreement() const {
 int StabilityReport::unsafe() const {
   int count = 0;
   for (const BoundaryCurve& curve : curves) {
-    for (const stability::BoundaryPoint& p : curve.points) count += p.unsafe();
+    for (const evidence::BoundaryPoint& p : curve.points) count += p.unsafe();
   }
   return count;
 }
@@ -435,7 +441,8 @@ std::vector<std::string> stability_sentences(const StabilityReport& report) {
   std::vector<std::string> out;
   out.push_back(
       "The measured boundary of a plain wall is the theory's, b = K (T/2 + t_d), within " +
-      significant(100 * report.worst_disagreement()) + " % at all rates, with and without delay.");
+      evidence::significant(100 * report.worst_disagreement()) +
+      " % at all rates, with and without delay.");
   const int unsafe = report.unsafe();
   out.push_back(
       (unsafe == 0
@@ -445,7 +452,7 @@ std::vector<std::string> stability_sentences(const StabilityReport& report) {
       std::to_string(report.points()) + " points of the map.");
   double ideal = HUGE_VAL, coarse = HUGE_VAL, late = HUGE_VAL;
   for (const ControllerGain& g : report.gains) {
-    const stability::LoopSettings& settings = g.loop.settings;
+    const evidence::LoopSettings& settings = g.loop.settings;
     double& least = settings.delay > 0 ? late : settings.resolution > 0 ? coarse : ideal;
     least = std::min(least, g.with / g.without);
   }
@@ -475,10 +482,11 @@ std::vector<analysis::Table> stability_tables(const StabilityReport& report) {
 
 std::string stability_text(const StabilityReport& report) {
   std::ostringstream out;
-  for (const std::string& sentence : stability_sentences(report)) put_wrapped(out, sentence);
-  for (const analysis::Table& table : stability_tables(report)) put_table(out, table);
+  for (const std::string& sentence : stability_sentences(report))
+    evidence::put_wrapped(out, sentence);
+  for (const analysis::Table& table : stability_tables(report)) evidence::put_table(out, table);
   out << "\nHow to read it\n";
-  for (const std::string& note : how_to_read()) put_wrapped(out, note);
+  for (const std::string& note : how_to_read()) evidence::put_wrapped(out, note);
   return out.str();
 }
 
@@ -497,7 +505,7 @@ Json stability_json(const StabilityReport& report) {
                  {"stiffest_with_n_per_m", g.with}};
     json["passivity_controller"].push_back(std::move(gain));
   }
-  for (const stability::IntegratorRow& row : report.integrators) {
+  for (const evidence::IntegratorRow& row : report.integrators) {
     json["integrators"].push_back(
         {{"case", row.oscillator},
          {"method", row.method},
@@ -530,9 +538,9 @@ constexpr double kEndDamping = 0.25,
                  kEndFriction = 0.025;  // N s/m, N: half of the simulated device
 constexpr double kResolution = 3e-5;    // m
 
-std::string in_khz(double rate) { return significant(rate / 1000) + " kHz"; }
+std::string in_khz(double rate) { return evidence::significant(rate / 1000) + " kHz"; }
 
-BoundaryCurve curve(const char* panel, std::string name, const stability::LoopCase& loop) {
+BoundaryCurve curve(const char* panel, std::string name, const evidence::LoopCase& loop) {
   return {panel, std::move(name), loop, {}};
 }
 
@@ -540,7 +548,7 @@ std::vector<BoundaryCurve> theory_curves() {
   std::vector<BoundaryCurve> out;
   for (const int delay : {0, 1}) {
     for (const double rate : kRates) {
-      stability::LoopCase loop;
+      evidence::LoopCase loop;
       loop.heavy = true;
       loop.settings.rate = rate;
       loop.settings.delay = delay;
@@ -554,43 +562,44 @@ std::vector<BoundaryCurve> map_curves() {
   std::vector<BoundaryCurve> out;
   for (const protocols::RendererKind renderer :
        {protocols::RendererKind::point, protocols::RendererKind::ray}) {
-    for (const stability::ContactCase contact_case : stability::kContactCases) {
-      stability::LoopCase loop;
+    for (const evidence::ContactCase contact_case : evidence::kContactCases) {
+      evidence::LoopCase loop;
       loop.contact_case = contact_case;
       loop.renderer = renderer;
       out.push_back(
           curve(renderer == protocols::RendererKind::point ? "scenes, point" : "scenes, ray",
-                stability::to_string(contact_case), loop));
+                evidence::to_string(contact_case), loop));
     }
   }
   for (const double rate : kRates) {
-    stability::LoopCase loop;
+    evidence::LoopCase loop;
     loop.settings.rate = rate;
     out.push_back(curve("rates, wall", in_khz(rate), loop));
   }
   for (const double damping : {0.0, 0.1, 1.0, 10.0}) {
-    stability::LoopCase loop;
+    evidence::LoopCase loop;
     loop.virtual_damping = damping;
-    out.push_back(curve("damping of the wall", "B " + significant(damping) + " N s/m", loop));
+    out.push_back(
+        curve("damping of the wall", "B " + evidence::significant(damping) + " N s/m", loop));
   }
   struct Hand {
     const char* name;
-    stability::EndImpedance impedance;
+    evidence::EndImpedance impedance;
   };
   const Hand hands[] = {{"none", {}},
                         {"soft: 50 N/m", {50, 1, 0.02}},
                         {"relaxed: 200 N/m", {200, 5, 0.05}},
                         {"stiff: 1000 N/m", {1000, 10, 0.05}}};
   for (const Hand& hand : hands) {
-    stability::LoopCase loop;
+    evidence::LoopCase loop;
     loop.settings.hand = hand.impedance;
     out.push_back(curve("hand, wall", hand.name, loop));
   }
-  stability::LoopCase layered;
+  evidence::LoopCase layered;
   layered.layer_share = 1;
   out.push_back(curve("layers and reach, wall", "a layer as stiff as the surface", layered));
   for (const double fraction : {1.0, 0.5}) {
-    stability::LoopCase far;
+    evidence::LoopCase far;
     far.settings.reach = rendering::Reach{.factor = 5, .fraction = fraction};
     out.push_back(curve("layers and reach, wall",
                         fraction == 1 ? "reach 5 about the tail" : "reach 5 about the middle",
@@ -606,7 +615,7 @@ std::vector<BoundaryCurve> map_curves() {
                             {"friction 0.5 N, 30 um", 0.5, kResolution, 0},
                             {"one tick late", 0, 0, 1}};
   for (const Device& device : devices) {
-    stability::LoopCase loop;
+    evidence::LoopCase loop;
     loop.settings.friction = device.friction;
     loop.settings.resolution = device.resolution;
     loop.settings.delay = device.delay;
@@ -617,28 +626,28 @@ std::vector<BoundaryCurve> map_curves() {
 
 std::vector<ControllerGain> gain_cases() {
   std::vector<ControllerGain> out;
-  const auto add = [&](const stability::LoopCase& loop) {
+  const auto add = [&](const evidence::LoopCase& loop) {
     out.push_back({loop, kEndDamping, 0, 0});
   };
   for (const protocols::RendererKind renderer :
        {protocols::RendererKind::point, protocols::RendererKind::ray}) {
-    for (const stability::ContactCase contact_case : stability::kContactCases) {
-      stability::LoopCase loop;
+    for (const evidence::ContactCase contact_case : evidence::kContactCases) {
+      evidence::LoopCase loop;
       loop.contact_case = contact_case;
       loop.renderer = renderer;
       add(loop);
     }
   }
   for (const double rate : kRates) {
-    stability::LoopCase loop;
+    evidence::LoopCase loop;
     loop.settings.rate = rate;
     if (rate != 1000) add(loop);
   }
-  stability::LoopCase coarse;
+  evidence::LoopCase coarse;
   coarse.settings.friction = kEndFriction;
   coarse.settings.resolution = kResolution;
   add(coarse);
-  stability::LoopCase late;
+  evidence::LoopCase late;
   late.settings.delay = 1;
   add(late);
   return out;
@@ -655,7 +664,7 @@ std::vector<double> grid(bool fine) {
 
 /// Runs all tasks on several threads.
 void run_all(const std::vector<std::function<void()>>& tasks, int jobs) {
-  ProgressLine progress("loops");
+  output::ProgressLine progress("loops");
   std::atomic<std::size_t> next{0};
   std::vector<std::thread> threads;
   const auto work = [&](bool shows) {
@@ -681,30 +690,30 @@ StabilityReport study(bool full, int jobs) {
       one.points.resize(stiffnesses.size());
       for (std::size_t i = 0; i < stiffnesses.size(); ++i) {
         tasks.emplace_back(
-            [&one, i, k = stiffnesses[i]] { one.points[i] = stability::boundary_at(one.loop, k); });
+            [&one, i, k = stiffnesses[i]] { one.points[i] = evidence::boundary_at(one.loop, k); });
       }
     }
   }
   for (ControllerGain& gain : report.gains) {
     tasks.emplace_back(
-        [&gain] { gain.without = stability::stiffest_stable(gain.loop, gain.damping); });
+        [&gain] { gain.without = evidence::stiffest_stable(gain.loop, gain.damping); });
     tasks.emplace_back([&gain] {
-      stability::LoopCase with = gain.loop;
+      evidence::LoopCase with = gain.loop;
       with.settings.passivity_controller = true;
-      gain.with = stability::stiffest_stable(with, gain.damping);
+      gain.with = evidence::stiffest_stable(with, gain.damping);
     });
   }
   run_all(tasks, jobs);
-  report.integrators = stability::compare_integrators(now_ns);
+  report.integrators = evidence::compare_integrators(output::now_ns);
   return report;
 }
 
-std::vector<stability::SoftSwing> study_soft(const std::vector<stability::SoftCase>& cases,
-                                             int jobs) {
-  std::vector<stability::SoftSwing> map(cases.size());
+std::vector<evidence::SoftSwing> study_soft(const std::vector<evidence::SoftCase>& cases,
+                                            int jobs) {
+  std::vector<evidence::SoftSwing> map(cases.size());
   std::vector<std::function<void()>> tasks;
   for (std::size_t i = 0; i < cases.size(); ++i)
-    tasks.emplace_back([&, i] { map[i] = stability::press_and_hold(cases[i]); });
+    tasks.emplace_back([&, i] { map[i] = evidence::press_and_hold(cases[i]); });
   run_all(tasks, jobs);
   return map;
 }
@@ -746,21 +755,21 @@ int stability_command(const std::vector<std::string>& args) {
   if (values->count("jobs") && (jobs < 1 || jobs > 256)) {
     throw UsageError("--jobs: must be 1 to 256, not " + std::to_string(jobs));
   }
-  Outputs outputs(*values, {"json", "report", "figure"}, {});
+  output::Outputs outputs(*values, {"json", "report", "figure"}, {});
   if (jobs == 0) jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   if (values->count("soft") > 0) {
     for (const char* const other : {"full", "report", "json"}) {
       if (values->count(other) > 0)
         throw UsageError(std::string("--soft: expected without --") + other);
     }
-    const std::vector<stability::SoftSwing> map = study_soft(
-        values->count("seed") > 0 ? stability::soft_cases_elsewhere(seed) : stability::soft_cases(),
+    const std::vector<evidence::SoftSwing> map = study_soft(
+        values->count("seed") > 0 ? evidence::soft_cases_elsewhere(seed) : evidence::soft_cases(),
         jobs);
     if (outputs.wanted("figure"))
       outputs.put("figure", analysis::figure_svg(soft_map_figure(map), analysis::light_palette()));
     outputs.write();
-    std::cout << stability::soft_map_text(map);
-    const auto is_good = [](const stability::SoftSwing& one) {
+    std::cout << evidence::soft_map_text(map);
+    const auto is_good = [](const evidence::SoftSwing& one) {
       return !one.accepted || one.settles();
     };
     return std::ranges::all_of(map, is_good) ? 0 : 1;

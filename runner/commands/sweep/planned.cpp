@@ -20,6 +20,7 @@
 #include "runner/commands/shared/study_options.h"
 #include "runner/session/run_record.h"
 #include "runner/session/simulated_study.h"
+#include "runner/study/simulation_limits.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -323,7 +324,7 @@ void check_sweep_options(const po::variables_map& values, SweepSettings& setting
   constexpr std::int64_t kMostPoints = 100'000'000;
   if (settings.points < 1 || settings.points > kMostPoints)
     throw UsageError("--points: must be 1 to " + std::to_string(kMostPoints));
-  check_simulated_participants(settings.participants);
+  study::check_simulated_participants(settings.participants);
   if (values.count("repetitions") && (settings.repetitions < 1 || settings.repetitions > 1000000))
     throw UsageError("--repetitions: must be 1 to 1000000");
   check_participant_version(values, settings.version);

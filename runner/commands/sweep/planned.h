@@ -9,7 +9,7 @@
 #include "data/sweep_record.h"
 #include "protocols/protocol.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/outputs.h"
+#include "runner/output/outputs.h"
 #include "runner/sweep/swept_study.h"
 
 namespace palpate::runner::commands {
@@ -58,6 +58,6 @@ std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
 /// `palpate analyze --sweep`: the analysis as text; puts the requested files into `outputs` without
 /// writing them. \throws UsageError: the file is not a sweep's, or the pattern is invalid
 std::string analyze_sweep_file(const std::string& file, const std::string& pattern,
-                               Outputs& outputs);
+                               output::Outputs& outputs);
 
 }  // namespace palpate::runner::commands

@@ -21,14 +21,14 @@
 #include "data/base/text.h"
 #include "data/store/sweep_file.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/progress_line.h"
 #include "runner/commands/shared/study_options.h"
 #include "runner/commands/sweep/planned.h"
+#include "runner/output/progress_line.h"
 
 namespace palpate::runner::commands {
 
 std::string analyze_sweep_file(const std::string& file, const std::string& pattern,
-                               Outputs& outputs) {
+                               output::Outputs& outputs) {
   try {
     const analysis::SweepAnalysis analysis =
         analysis::analyze_sweep(analysis::read_sweep_table(file), pattern, PALPATE_VERSION);
@@ -159,7 +159,7 @@ class PointQueue {
 /// \param before  points of the shard already on record \return points on record now
 std::int64_t run_points(const Sweep& sweep, data::SweepFile& file, PointQueue& queue, int jobs,
                         std::int64_t before) {
-  const std::atomic<bool>& signal = catch_stop_signals();
+  const std::atomic<bool>& signal = output::catch_stop_signals();
   std::atomic<bool> stop{false};
   const int workers =
       static_cast<int>(std::min<std::size_t>(static_cast<std::size_t>(jobs), queue.size()));
@@ -178,7 +178,7 @@ std::int64_t run_points(const Sweep& sweep, data::SweepFile& file, PointQueue& q
   std::vector<std::jthread> threads;
   threads.reserve(static_cast<std::size_t>(workers));
   for (int i = 0; i < workers; ++i) threads.emplace_back(work);
-  ProgressLine line("points");
+  output::ProgressLine line("points");
   std::int64_t done = before;
   const auto all = static_cast<double>(before) + static_cast<double>(queue.size());
   if (workers > 0) line.show(static_cast<double>(before) / all);

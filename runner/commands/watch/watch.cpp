@@ -6,8 +6,8 @@
 #include "data/base/text.h"
 #include "data/store/store.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/outputs.h"
-#include "runner/commands/watch/trial_page.h"
+#include "runner/output/outputs.h"
+#include "runner/touch/trial_page.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -63,18 +63,18 @@ int watch_command(const std::vector<std::string>& args) {
   add("force", "replace an existing page");
   const auto values = line.parse(args);
   if (!values) return 0;
-  Outputs outputs(*values, {"out"}, {"db"});
+  output::Outputs outputs(*values, {"out"}, {"db"});
   const bool compare = values->count("compare") > 0;
   const std::vector<data::TrialName> names = names_of(trials, compare);
   data::Store store = data::Store::open(db, data::Store::Mode::read_only);
-  std::vector<WatchedTrial> watched;
+  std::vector<touch::WatchedTrial> watched;
   for (const data::TrialName& name : names) {
     watched.push_back(
         {session::to_string(name), session::load_recorded_trial(store, name, protocol, folder)});
     for (const protocols::StimulusSpec& stimulus : watched.back().trial.protocol.stimuli)
       outputs.protect(stimulus.object);
   }
-  TrialPage page = trial_page(watched, compare);
+  touch::TrialPage page = touch::trial_page(watched, compare);
   for (const std::string& note : page.notes) std::cerr << "note: " << printable(note) << "\n";
   const std::size_t size = page.html.size();
   outputs.put("out", std::move(page.html));

@@ -6,13 +6,13 @@ function(palpate_embed name header)
   set(assets "${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp")
   set(draft "${assets}.draft")
   file(WRITE "${draft}" "// Made by watch_assets.cmake when the build is configured.\n"
-       "#include \"${header}\"\n\nnamespace palpate::runner::commands {\n\n")
+       "#include \"${header}\"\n\nnamespace palpate::runner::touch {\n\n")
   while(ARGN)
     list(POP_FRONT ARGN function text)
     # A literal may have 64 kB: more would need pieces.
     file(APPEND "${draft}" "std::string_view ${function}() {\n  return R\"palpate~(" "${${text}}" ")palpate~\";\n}\n\n")
   endwhile()
-  file(APPEND "${draft}" "}  // namespace palpate::runner::commands\n")
+  file(APPEND "${draft}" "}  // namespace palpate::runner::touch\n")
   configure_file("${draft}" "${assets}" COPYONLY)  # an equal one is left as it is
 endfunction()
 
@@ -22,6 +22,6 @@ foreach(file IN ITEMS watch/watch.css watch/watch.js watch/drawing.js serve/live
   set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${CMAKE_CURRENT_SOURCE_DIR}/commands/${file}")
 endforeach()
 set(watch_script "${watch_drawing_js}${watch_watch_js}")
-palpate_embed(watch_assets runner/commands/watch/trial_page.h watch_css watch_watch_css watch_js watch_script)
+palpate_embed(watch_assets runner/touch/trial_page.h watch_css watch_watch_css watch_js watch_script)
 string(REPLACE "@SCRIPT@" "${watch_drawing_js}${serve_live_js}" live_text "${serve_live_html}")
-palpate_embed(live_page runner/commands/watch/trial_page.h live_page live_text)
+palpate_embed(live_page runner/touch/trial_page.h live_page live_text)

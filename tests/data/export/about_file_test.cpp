@@ -1,6 +1,6 @@
 // The file of --about: accepted content, and faults named with their place.
 
-#include "runner/commands/shared/about_file.h"
+#include "runner/registration/about_file.h"
 
 #include <gtest/gtest.h>
 
@@ -28,8 +28,8 @@ std::vector<fs::path> studies(const std::string& folder) {
 TEST(AboutFile, IsReadAsItIsWritten) {
   EXPECT_GE(studies("good").size(), 3U);
   for (const fs::path& file : studies("good"))
-    EXPECT_NO_THROW(commands::read_about_file(file)) << file;
-  const data::StudyAbout about = commands::read_about_file(kStudies + "good/everything.json");
+    EXPECT_NO_THROW(registration::read_about_file(file)) << file;
+  const data::StudyAbout about = registration::read_about_file(kStudies + "good/everything.json");
   ASSERT_EQ(about.authors.size(), 3U);
   EXPECT_EQ(about.authors[0].name, "Example, Ada");
   EXPECT_EQ(about.authors[0].affiliation, "Universität Beispielstadt");
@@ -39,7 +39,7 @@ TEST(AboutFile, IsReadAsItIsWritten) {
   EXPECT_EQ(about.doi, "10.5281/zenodo.1234");
   EXPECT_EQ(data::license_url(about), "https://spdx.org/licenses/CC-BY-4.0.html");
   const data::StudyAbout other =
-      commands::read_about_file(kStudies + "good/license-by-address.json");
+      registration::read_about_file(kStudies + "good/license-by-address.json");
   EXPECT_EQ(data::license_url(other), "https://example.org/license");
   EXPECT_EQ(data::doi_url(other), "");
 }
@@ -51,7 +51,7 @@ TEST(AboutFile, NamesEveryFaultOfBadFiles) {
     std::ifstream lines(fs::path(file).replace_extension(".faults"));
     for (std::string line; std::getline(lines, line);) expected.push_back(line);
     try {
-      commands::read_about_file(file);
+      registration::read_about_file(file);
       ADD_FAILURE() << file << " is accepted";
     } catch (const protocols::InputError& error) {
       for (const protocols::Fault& fault : error.faults()) found.push_back(fault.location);
@@ -72,9 +72,9 @@ TEST(AboutFile, EveryWrongDigitOfAnOrcidIsFound) {
       const std::string text =
           R"({"version": 1, "authors": [{"name": "A", "orcid": ")" + changed + R"("}]})";
       if (changed == good) {
-        EXPECT_NO_THROW(commands::read_about_text(text, "study.json"));
+        EXPECT_NO_THROW(registration::read_about_text(text, "study.json"));
       } else {
-        EXPECT_THROW(commands::read_about_text(text, "study.json"), protocols::InputError)
+        EXPECT_THROW(registration::read_about_text(text, "study.json"), protocols::InputError)
             << changed;
       }
     }

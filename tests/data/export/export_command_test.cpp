@@ -22,7 +22,7 @@ class ExportCommand : public ::testing::Test {
   std::string usage_error(const std::vector<std::string>& words) {
     try {
       runner::commands::export_command(words);
-    } catch (const runner::commands::UsageError& error) {
+    } catch (const runner::UsageError& error) {
       return error.what();
     }
     ADD_FAILURE() << "no UsageError";

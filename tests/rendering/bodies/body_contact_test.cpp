@@ -9,7 +9,7 @@
 #include "data/base/random.h"
 #include "rendering/bodies/body_world.h"
 #include "rendering/probe.h"
-#include "runner/bench/tick_meters.h"
+#include "runner/evidence/tick_meters.h"
 #include "tests/rendering/bodies/body_fixtures.h"
 
 namespace palpate::rendering::test {
@@ -303,9 +303,9 @@ TEST(BodyContact, StepsDoNotAllocate) {
   const Scene scene = s.scene();
   RenderState state = scene.initial_state();
   run(scene, state, 0.1);
-  const std::uint64_t before = runner::bench::allocations();
+  const std::uint64_t before = runner::evidence::allocations();
   run(scene, state, 0.7);
-  EXPECT_EQ(runner::bench::allocations() - before, 0U);
+  EXPECT_EQ(runner::evidence::allocations() - before, 0U);
 }
 
 }  // namespace

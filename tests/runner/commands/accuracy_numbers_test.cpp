@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
-#include "rendering/accuracy/study.h"
-#include "runner/commands/accuracy/report.h"
+#include "runner/evidence/accuracy/study.h"
+#include "runner/evidence/reports/accuracy_report.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -27,7 +27,7 @@ class Numbers {
     expected[path] = static_cast<double>(next_);
     next_ += 37;
   }
-  void spread(rendering::ErrorSpread& to, const std::string& path, const std::string& unit) {
+  void spread(evidence::ErrorSpread& to, const std::string& path, const std::string& unit) {
     set(to.count, path + "/count");
     set(to.rms, path + "/rms_" + unit);
     set(to.p999, path + "/p999_" + unit);
@@ -56,8 +56,8 @@ void collect(const Json& value, const std::string& path, std::map<std::string, d
   }
 }
 
-void fill_searches(AccuracyReport& report, Numbers& n) {
-  rendering::SearchCounts& c = report.search.emplace();
+void fill_searches(evidence::AccuracyReport& report, Numbers& n) {
+  evidence::SearchCounts& c = report.search.emplace();
   for (auto& [value, name] :
        std::vector<std::pair<std::uint64_t*, const char*>>{{&c.ticks, "ticks"},
                                                            {&c.walks, "walks"},
@@ -76,7 +76,7 @@ void fill_searches(AccuracyReport& report, Numbers& n) {
     n.set(*value, std::string("/search/") + name);
   n.set(c.worst_penetration, "/search/worst_penetration_of_size");
   n.expected["/search/wrong"] = static_cast<double>(c.wrong());
-  rendering::UnionCounts& u = report.union_search.emplace();
+  evidence::UnionCounts& u = report.union_search.emplace();
   for (auto& [value, name] :
        std::vector<std::pair<std::uint64_t*, const char*>>{{&u.ticks, "ticks"},
                                                            {&u.walks, "walks"},
@@ -105,8 +105,8 @@ void fill_searches(AccuracyReport& report, Numbers& n) {
   n.expected["/union_search/seed"] = n.expected["/search/seed"];
 }
 
-void fill_studies(AccuracyReport& report, Numbers& n) {
-  rendering::UnionRow& one = report.unions.emplace_back();
+void fill_studies(evidence::AccuracyReport& report, Numbers& n) {
+  evidence::UnionRow& one = report.unions.emplace_back();
   one.name = "a case", one.truth = "a truth", one.method = "law", one.one_ideal_tool = true;
   n.set(one.segments, "/unions/rows/0/segments");
   n.set(one.ns_per_tick, "/unions/rows/0/ns_per_tick");
@@ -115,7 +115,7 @@ void fill_studies(AccuracyReport& report, Numbers& n) {
   n.set(one.inside, "/unions/rows/0/inside");
   n.set(one.off_by_a_tenth, "/unions/rows/0/off_by_a_tenth");
   n.spread(one.force, "/unions/rows/0/force", "n");
-  rendering::SoftRow& soft = report.soft.emplace_back();
+  evidence::SoftRow& soft = report.soft.emplace_back();
   soft.name = "a case", soft.truth = "a truth", soft.unit = "mm";
   n.set(soft.nodes, "/soft/0/nodes");
   n.set(soft.elements, "/soft/0/elements");
@@ -123,23 +123,23 @@ void fill_studies(AccuracyReport& report, Numbers& n) {
   n.set(soft.reference, "/soft/0/reference");
   n.set(soft.error, "/soft/0/error");
   n.set(soft.step_ns, "/soft/0/ns_per_step");
-  rendering::BodyRow& body = report.bodies.emplace_back();
+  evidence::BodyRow& body = report.bodies.emplace_back();
   body.name = "a case", body.measure = "speed", body.engine = "palpate";
   n.set(body.error, "/bodies/rows/0/error");
   n.set(body.us_per_step, "/bodies/rows/0/us_per_step");
   n.set(report.body_tick.median, "/bodies/eleven_us/median");
   n.set(report.body_tick.p99, "/bodies/eleven_us/p99");
   n.set(report.body_tick.most, "/bodies/eleven_us/max");
-  ExtremeRow& extreme = report.extremes.emplace_back();
+  evidence::ExtremeRow& extreme = report.extremes.emplace_back();
   extreme = {"sliver", "a sliver", "depth, m", "ray", {}};
   extreme.result.detail = "a detail";
   n.set(extreme.result.ticks, "/extremes/0/ticks");
   n.set(extreme.result.in_contact, "/extremes/0/in_contact");
   n.set(extreme.result.worst, "/extremes/0/worst");
   n.set(extreme.result.limit, "/extremes/0/allowed");
-  FirstContactStudy& first = report.first_contacts.emplace_back();
+  evidence::FirstContactStudy& first = report.first_contacts.emplace_back();
   first.shape = "cube";
-  rendering::FirstContactLoss& loss = first.speeds.emplace_back();
+  evidence::FirstContactLoss& loss = first.speeds.emplace_back();
   n.set(loss.speed, "/first_contact/rows/0/speed_m_per_s");
   n.set(loss.turning, "/first_contact/rows/0/turning_rad_per_s");
   n.set(loss.entries, "/first_contact/rows/0/entries");
@@ -151,7 +151,7 @@ void fill_studies(AccuracyReport& report, Numbers& n) {
   n.set(report.exact_test_ns, "/first_contact/exact_test_ns");
 }
 
-void fill_errors(rendering::ErrorSummary& errors, const std::string& path, Numbers& n) {
+void fill_errors(evidence::ErrorSummary& errors, const std::string& path, Numbers& n) {
   n.set(errors.ticks, path + "/ticks");
   n.set(errors.lost, path + "/lost");
   n.set(errors.gave_up, path + "/gave_up");
@@ -165,9 +165,9 @@ void fill_errors(rendering::ErrorSummary& errors, const std::string& path, Numbe
 }
 
 TEST(AccuracyJson, HasEveryNumberExactlyOnceUnderItsName) {
-  AccuracyReport report;
+  evidence::AccuracyReport report;
   Numbers n;
-  rendering::AccuracyRow& row = report.rows.emplace_back();
+  evidence::AccuracyRow& row = report.rows.emplace_back();
   row.shape = "sphere", row.probe = "ray", row.method = "tick";
   n.set(row.triangles, "/rows/0/triangles");
   n.set(row.facets, "/rows/0/facets");
@@ -180,7 +180,7 @@ TEST(AccuracyJson, HasEveryNumberExactlyOnceUnderItsName) {
   fill_studies(report, n);
   fill_searches(report, n);
   std::map<std::string, double> found;
-  collect(accuracy_json(report), "", found);
+  collect(evidence::accuracy_json(report), "", found);
   for (const auto& [path, value] : n.expected) EXPECT_EQ(found[path], value) << path;
   for (const auto& [path, value] : found) EXPECT_TRUE(n.expected.contains(path)) << path;
 }
@@ -190,11 +190,11 @@ bool is_number(const std::string& cell) {
 }
 
 TEST(AccuracyTables, HaveTheirFormWithNamesBeforeNumbers) {
-  AccuracyReport report;
+  evidence::AccuracyReport report;
   Numbers n;
   for (const char* const probe : {"ray", "point"}) {
     for (const int triangles : {20, 80}) {
-      rendering::AccuracyRow& row = report.rows.emplace_back();
+      evidence::AccuracyRow& row = report.rows.emplace_back();
       row.shape = "sphere", row.probe = probe, row.method = "tick", row.triangles = triangles;
       row.ns_per_tick = 50;
       fill_errors(row.shape_errors, "", n);
@@ -202,7 +202,7 @@ TEST(AccuracyTables, HaveTheirFormWithNamesBeforeNumbers) {
   }
   fill_studies(report, n);
   fill_searches(report, n);
-  const std::vector<analysis::Table> tables = accuracy_tables(report);
+  const std::vector<analysis::Table> tables = evidence::accuracy_tables(report);
   EXPECT_GE(tables.size(), 6U);
   for (const analysis::Table& table : tables) {
     EXPECT_FALSE(table.caption.empty());

@@ -1,3 +1,5 @@
+#include "runner/evidence/reports/accuracy_report.h"
+
 #include <gtest/gtest.h>
 
 #include <set>
@@ -5,13 +7,12 @@
 #include <vector>
 
 #include "analysis/figures/svg.h"
-#include "runner/commands/accuracy/report.h"
 
 namespace palpate::runner::commands {
 namespace {
 
-rendering::AccuracyRow row_of(const std::string& shape, int triangles, const std::string& probe) {
-  rendering::AccuracyRow row;
+evidence::AccuracyRow row_of(const std::string& shape, int triangles, const std::string& probe) {
+  evidence::AccuracyRow row;
   row.shape = shape;
   row.triangles = triangles;
   row.probe = probe;
@@ -22,7 +23,7 @@ rendering::AccuracyRow row_of(const std::string& shape, int triangles, const std
 
 // A new shape is measured automatically; it must appear in all outputs too.
 TEST(AccuracyReport, ShowsEveryShapeThatWasMeasured) {
-  AccuracyReport report;
+  evidence::AccuracyReport report;
   for (const char* probe : {"ray", "point"}) {
     report.rows.push_back(row_of("sphere", 20, probe));
     report.rows.push_back(row_of("sphere", 80, probe));
@@ -30,10 +31,10 @@ TEST(AccuracyReport, ShowsEveryShapeThatWasMeasured) {
       report.rows.push_back(row_of(added, 8, probe));
     }
   }
-  const std::string text = accuracy_text(report),
-                    figure =
-                        analysis::figure_svg(accuracy_figure(report), analysis::light_palette());
-  const auto json = accuracy_json(report);
+  const std::string text = evidence::accuracy_text(report),
+                    figure = analysis::figure_svg(evidence::accuracy_figure(report),
+                                                  analysis::light_palette());
+  const auto json = evidence::accuracy_json(report);
   ASSERT_EQ(json["recommended"].size(), 5U);
   EXPECT_EQ(json["recommended"][0]["shape"], "sphere");
   EXPECT_EQ(json["recommended"][1]["shape"], "octahedron");
@@ -44,7 +45,7 @@ TEST(AccuracyReport, ShowsEveryShapeThatWasMeasured) {
     EXPECT_NE(figure.find(std::string(">") + shape + "<"), std::string::npos) << shape;
   }
   // Two kinds of error with the same axes, each in rows of three panels.
-  const std::vector<analysis::Panel> panels = accuracy_figure(report).panels;
+  const std::vector<analysis::Panel> panels = evidence::accuracy_figure(report).panels;
   ASSERT_EQ(panels.size(), 10U);
   for (std::size_t p = 0; p < panels.size(); ++p) {
     EXPECT_EQ(panels[p].starts_row, p % 5 == 0 || p % 5 == 3);
@@ -55,7 +56,7 @@ TEST(AccuracyReport, ShowsEveryShapeThatWasMeasured) {
 }
 
 TEST(AccuracyReport, FitsThePageAndTellsMethodsWithoutColour) {
-  AccuracyReport report;
+  evidence::AccuracyReport report;
   const std::vector<std::string> methods{"tick", "walk",        "walk-float", "walk-cold",
                                          "scan", "brute-force", "bullet",     "fcl"};
   for (const char* shape : {"sphere", "cone", "cylinder", "cube", "box"}) {
@@ -64,7 +65,7 @@ TEST(AccuracyReport, FitsThePageAndTellsMethodsWithoutColour) {
       report.rows.back().method = method;
     }
   }
-  const analysis::Figure figure = accuracy_figure(report);
+  const analysis::Figure figure = evidence::accuracy_figure(report);
   ASSERT_EQ(figure.legend.size(), methods.size());
   std::set<analysis::MarkerShape> shapes;
   for (const analysis::LegendEntry& entry : figure.legend) shapes.insert(entry.shape);

@@ -14,7 +14,7 @@
 #include <string>
 #include <vector>
 
-#include "runner/bench/tick_meters.h"
+#include "runner/evidence/tick_meters.h"
 #include "tests/runner/participants/ideal_touches.h"
 
 namespace palpate::runner::participants {
@@ -163,7 +163,7 @@ TEST(HeadingChoice, GoesStraightOnIfOneShapeIsCertain) {
 }
 
 TEST(HeadingChoice, AllocatesNothing) {
-  if (!bench::counts_allocations()) GTEST_SKIP() << "a sanitizer brings its own operator new";
+  if (!evidence::counts_allocations()) GTEST_SKIP() << "a sanitizer brings its own operator new";
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses, by_movement());
   HeadingChoice choice(hypotheses, by_movement(), {});
@@ -171,9 +171,9 @@ TEST(HeadingChoice, AllocatesNothing) {
   Random random(kSeed);
   for (const bool ray : {false, true}) {
     const SlidingStylus stylus{ray, {0, 0, 0.03}, {0, 0.05, 0.13}, {0, 0, 1}, {1, 0, 0}};
-    const std::uint64_t before = bench::allocations();
+    const std::uint64_t before = evidence::allocations();
     choice.choose(observer, stylus, random);
-    EXPECT_EQ(bench::allocations(), before) << ray;
+    EXPECT_EQ(evidence::allocations(), before) << ray;
   }
 }
 

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "runner/bench/tick_meters.h"
+#include "runner/evidence/tick_meters.h"
 #include "runner/participants/shape_observer.h"
 #include "tests/runner/participants/observer_reference.h"
 
@@ -8,10 +8,10 @@ namespace palpate::runner::participants {
 namespace {
 
 TEST(ShapeObserverAllocation, UpdateAllocatesNothing) {
-  if (!bench::counts_allocations()) GTEST_SKIP() << "a sanitizer brings its own operator new";
+  if (!evidence::counts_allocations()) GTEST_SKIP() << "a sanitizer brings its own operator new";
   const ShapeHypotheses hypotheses(test::four_shapes());
   ShapeObserver observer(hypotheses);
-  EXPECT_GT(bench::allocations(), 0u);
+  EXPECT_GT(evidence::allocations(), 0u);
   Percept percept;
   percept.tip = {-0.06, 0, 0.03};
   percept.tail = {0.06, 0, 0.03};
@@ -21,9 +21,9 @@ TEST(ShapeObserverAllocation, UpdateAllocatesNothing) {
       percept.ray = ray;
       percept.contact = contact;
       if (ray) percept.along = 0.05;
-      const std::uint64_t before = bench::allocations();
+      const std::uint64_t before = evidence::allocations();
       observer.update(percept);
-      EXPECT_EQ(bench::allocations(), before) << ray << contact;
+      EXPECT_EQ(evidence::allocations(), before) << ray << contact;
     }
   }
 }

@@ -15,7 +15,7 @@
 #include <cstdlib>
 #include <cstring>
 
-#include "runner/bench/tick_meters.h"
+#include "runner/evidence/tick_meters.h"
 #include "runner/servo/servo_thread.h"
 #include "stimuli/primitives.h"
 
@@ -84,10 +84,11 @@ bool two_trials(SlidingDevice& device) {
 std::atomic<std::uint64_t> allocated_at_20{0}, allocated_at_1000{1};
 
 TEST(ServoTick, AllocatesNothing) {
-  if (!bench::counts_allocations()) GTEST_SKIP() << "allocations are not counted under sanitizers";
+  if (!evidence::counts_allocations())
+    GTEST_SKIP() << "allocations are not counted under sanitizers";
   SlidingDevice device([](int tick) {
-    if (tick == 20) allocated_at_20 = bench::allocations();
-    if (tick == 950) allocated_at_1000 = bench::allocations();
+    if (tick == 20) allocated_at_20 = evidence::allocations();
+    if (tick == 950) allocated_at_1000 = evidence::allocations();
   });
   EXPECT_TRUE(two_trials(device));
   EXPECT_EQ(allocated_at_1000, allocated_at_20);

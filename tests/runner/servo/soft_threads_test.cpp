@@ -16,7 +16,7 @@
 #include "data/base/random.h"
 #include "rendering/bodies/soft/soft_scene.h"
 #include "rendering/renderer.h"
-#include "runner/bench/tick_meters.h"
+#include "runner/evidence/tick_meters.h"
 #include "runner/servo/servo_thread.h"
 #include "tests/runner/fake_device.h"
 
@@ -179,10 +179,10 @@ TEST(SoftThreads, TicksDoNotAllocate) {
     SoftSnapshot snapshot;
     if (threads[made].latest(snapshot) && snapshot.steps > 0) ++made;
   }
-  const std::uint64_t before = bench::allocations();
+  const std::uint64_t before = evidence::allocations();
   for (const PathTick& tick : path)
     rendering::ray_renderer().tick(scene, state, tick.probe, tick.dt);
-  EXPECT_EQ(bench::allocations(), before);
+  EXPECT_EQ(evidence::allocations(), before);
 }
 
 /// Virtual time with a short real sleep in each tick.

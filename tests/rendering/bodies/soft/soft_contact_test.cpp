@@ -10,7 +10,7 @@
 
 #include "data/base/random.h"
 #include "rendering/bodies/soft/soft_scene.h"
-#include "runner/bench/tick_meters.h"
+#include "runner/evidence/tick_meters.h"
 
 namespace palpate::rendering {
 namespace {
@@ -236,7 +236,7 @@ TEST(SoftContact, ATickNeitherAllocatesNorGivesNaN) {
   constexpr std::uint64_t kSeed = 19;
   Random random(kSeed);
   Vec3 tip(-0.03, 0, 0.03);
-  const std::uint64_t before = runner::bench::allocations();
+  const std::uint64_t before = runner::evidence::allocations();
   for (int i = 0; i < 3000; ++i) {
     const Vec3 step = 0.001 * Vec3(random.unit() - 0.5, random.unit() - 0.5, random.unit() - 0.55);
     tip += step;
@@ -244,7 +244,7 @@ TEST(SoftContact, ATickNeitherAllocatesNorGivesNaN) {
     const Vec3 force = advance(object, state, tip, tool, glm::length(step), 0.001);
     ASSERT_TRUE(std::isfinite(force.x + force.y + force.z));
   }
-  EXPECT_EQ(runner::bench::allocations(), before);
+  EXPECT_EQ(runner::evidence::allocations(), before);
 }
 
 TEST(SoftContact, TheSamePathGivesTheSameForcesToTheBit) {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "rendering/renderer.h"
-#include "runner/bench/tick_meters.h"
+#include "runner/evidence/tick_meters.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::rendering {
@@ -266,9 +266,9 @@ TEST(SoftScene, TicksWithSeveralDoNotAllocateNorDoThoseOfACopy) {
   RenderState copy = state;
   for (RenderState* const touched : {&state, &copy}) {
     for (const double x : {0.002, 0.062}) {
-      const std::uint64_t before = runner::bench::allocations();
+      const std::uint64_t before = runner::evidence::allocations();
       const Rendering r = press(ray_renderer(), scene, *touched, x, 0.004);
-      EXPECT_EQ(runner::bench::allocations(), before) << x;
+      EXPECT_EQ(runner::evidence::allocations(), before) << x;
       EXPECT_GT(r.force.z, 0.1) << x;
     }
   }

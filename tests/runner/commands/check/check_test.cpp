@@ -18,8 +18,8 @@
 #include "data/store/task_text.h"
 #include "protocols/parse.h"
 #include "runner/build_info.h"
-#include "runner/commands/check/deviations.h"
 #include "runner/commands/shared/command.h"
+#include "runner/registration/deviations.h"
 #include "runner/session/run_record.h"
 #include "tests/shared/temporary_folder.h"
 
@@ -102,7 +102,7 @@ class Check : public ::testing::Test {
   std::string database() const { return folder_ / "study.db"; }
 
   void run(const Change& change = {}) {
-    const Registration registered = read_registration(registration());
+    const registration::Registration registered = registration::read_registration(registration());
     const protocols::Protocol protocol =
         protocols::parse_protocol_text(change.protocol, "brief.json");
     data::Store store = data::Store::open(database(), data::Store::Mode::write_or_create);
@@ -171,28 +171,29 @@ class Check : public ::testing::Test {
     }
   }
 
-  StudyCheck check(const ReportedAnalysis& reported = {}) const {
-    return check_study(read_registration(registration()), registration(), database(), reported);
+  registration::StudyCheck check(const registration::ReportedAnalysis& reported = {}) const {
+    return registration::check_study(registration::read_registration(registration()),
+                                     registration(), database(), reported);
   }
 
   /// Ids of the deviating points.
-  static std::vector<std::string> deviating(const StudyCheck& check) {
+  static std::vector<std::string> deviating(const registration::StudyCheck& check) {
     std::vector<std::string> ids;
-    for (const CheckPoint& point : check.points) {
-      if (point.finding == Finding::deviation) ids.push_back(point.id);
+    for (const registration::CheckPoint& point : check.points) {
+      if (point.finding == registration::Finding::deviation) ids.push_back(point.id);
     }
     return ids;
   }
-  static std::string evidence(const StudyCheck& check) {
+  static std::string evidence(const registration::StudyCheck& check) {
     std::string all;
-    for (const CheckPoint& point : check.points) {
-      if (point.finding != Finding::deviation) continue;
+    for (const registration::CheckPoint& point : check.points) {
+      if (point.finding != registration::Finding::deviation) continue;
       for (const std::string& line : point.evidence) all += line + "\n";
     }
     return all;
   }
   /// Expects only this deviation, with these words in its evidence.
-  static void expect_alone(const StudyCheck& check, const std::string& id,
+  static void expect_alone(const registration::StudyCheck& check, const std::string& id,
                            const std::vector<std::string>& words) {
     EXPECT_EQ(deviating(check), std::vector<std::string>{id});
     for (const std::string& word : words)
@@ -207,16 +208,16 @@ testing::TemporaryFolder* Check::shared_ = nullptr;
 
 TEST_F(Check, AStudyThatMatchesItsRegistrationPasses) {
   run();
-  const StudyCheck found = check();
+  const registration::StudyCheck found = check();
   EXPECT_EQ(deviating(found), std::vector<std::string>{}) << evidence(found);
-  EXPECT_EQ(conclusion_of(found), "Run as registered");
+  EXPECT_EQ(registration::conclusion_of(found), "Run as registered");
   EXPECT_EQ(found.participants, 4U);
   EXPECT_EQ(found.label, "");
 }
 
 TEST_F(Check, HypothesesAreJudged) {
   run();
-  const StudyCheck found = check();
+  const registration::StudyCheck found = check();
   ASSERT_EQ(found.hypotheses.size(), 3U);
   EXPECT_EQ(found.hypotheses[0].second.verdict, analysis::Verdict::corroborated);
   EXPECT_EQ(found.hypotheses[1].second.verdict, analysis::Verdict::undecided);
@@ -228,7 +229,7 @@ TEST_F(Check, HypothesesAreJudged) {
 
 TEST_F(Check, SimulatedParticipantsAreLabelledAndHaveNoDates) {
   run({.simulated = true, .early = 1});
-  const StudyCheck found = check();
+  const registration::StudyCheck found = check();
   EXPECT_EQ(deviating(found), std::vector<std::string>{}) << evidence(found);
   EXPECT_EQ(found.label, "SIMULATED PARTICIPANTS");
 }
@@ -343,7 +344,7 @@ TEST_F(Check, FillingInTheRequestedFieldsIsNoDeviation) {
   ASSERT_NE(field, std::string::npos) << text;
   text.replace(field + 1, text.find('\n', field + 1) - field - 1, "Answers.");
   write(path, text);
-  const StudyCheck found = check();
+  const registration::StudyCheck found = check();
   EXPECT_EQ(deviating(found), std::vector<std::string>{});
   EXPECT_NE(found.points[0].sentence.find("registration.md"), std::string::npos);
 }
@@ -371,8 +372,9 @@ TEST_F(Check, WithdrawnParticipantsAreNotUsed) {
 
 TEST_F(Check, ForeignTextsAreShownLiterally) {
   run({.note = "pre-flight: <script>alert(1)</script>; WITHOUT calibration"});
-  const StudyCheck found = check();
-  const std::string page = check_html(found, read_registration(registration()));
+  const registration::StudyCheck found = check();
+  const std::string page =
+      registration::check_html(found, registration::read_registration(registration()));
   EXPECT_EQ(page.find("<script>alert"), std::string::npos);
   EXPECT_NE(page.find("&lt;script&gt;alert(1)"), std::string::npos);
 }

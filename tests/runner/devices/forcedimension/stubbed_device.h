@@ -9,7 +9,7 @@
 #include <stdexcept>
 #include <string>
 
-#include "runner/bench/tick_meters.h"
+#include "runner/evidence/tick_meters.h"
 #include "runner/servo/device.h"
 #include "tests/runner/devices/forcedimension/stub_state.h"
 #include "tests/shared/temporary_folder.h"
@@ -48,15 +48,15 @@ class StubbedDevice : public ::testing::Test {
     }
   }
   static void expect_no_allocation(servo::Device& device) {
-    if (!bench::counts_allocations())
+    if (!evidence::counts_allocations())
       GTEST_SKIP() << "allocations are not counted under sanitizers";
     constexpr int kMinuteOfTicks = 60'000;  // at 1 kHz
-    const std::uint64_t before = bench::allocations();
+    const std::uint64_t before = evidence::allocations();
     for (int tick = 0; tick < kMinuteOfTicks; ++tick) {
       device.read();
       device.write({0, 0, 1}, Vec3(0));
     }
-    EXPECT_EQ(bench::allocations(), before);
+    EXPECT_EQ(evidence::allocations(), before);
   }
 
   StubState* state_;

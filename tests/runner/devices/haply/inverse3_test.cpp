@@ -12,7 +12,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "runner/bench/tick_meters.h"
+#include "runner/evidence/tick_meters.h"
 #include "tests/runner/devices/haply/emulated_service.h"
 
 namespace palpate::runner::devices::haply {
@@ -254,15 +254,16 @@ TEST_F(Inverse3, EveryFaultGivesTroubleAndZeroForceAndAllowsReopening) {
 }
 
 TEST_F(Inverse3, ReadsAndWritesDoNotAllocate) {
-  if (!bench::counts_allocations()) GTEST_SKIP() << "allocations are not counted under sanitizers";
+  if (!evidence::counts_allocations())
+    GTEST_SKIP() << "allocations are not counted under sanitizers";
   const auto device = open(config_);
   ASSERT_TRUE(works(*device));
-  const std::uint64_t before = bench::allocations();
+  const std::uint64_t before = evidence::allocations();
   for (int tick = 0; tick < kMinuteOfTicks; ++tick) {
     device->read();
     device->write({0, 0, 1}, Vec3(0));
   }
-  EXPECT_EQ(bench::allocations(), before);
+  EXPECT_EQ(evidence::allocations(), before);
 }
 
 TEST_F(Inverse3, AServiceThatEndsAndComesBackIsOpenedAgain) {

@@ -1,0 +1,36 @@
+#include "runner/evidence/accuracy/peers.h"
+
+#include <array>
+
+#include "runner/evidence/accuracy/peers_hull.h"
+
+namespace palpate::runner::evidence {
+namespace {
+
+#ifdef PALPATE_BULLET_VERSION
+constexpr const char* kBulletVersion = PALPATE_BULLET_VERSION;
+constexpr MakePeer kMakeBullet = peers::make_bullet;
+#else
+constexpr const char* kBulletVersion = "";
+constexpr MakePeer kMakeBullet = nullptr;
+#endif
+
+#ifdef PALPATE_FCL_VERSION
+constexpr const char* kFclVersion = PALPATE_FCL_VERSION;
+constexpr MakePeer kMakeFcl = peers::make_fcl;
+#else
+constexpr const char* kFclVersion = "";
+constexpr MakePeer kMakeFcl = nullptr;
+#endif
+
+}  // namespace
+
+std::span<const PeerLibrary> peer_libraries() {
+  static constexpr std::array kLibraries = {
+      PeerLibrary{"bullet", kBulletVersion, "btGjkEpaSolver2, double precision, margin 0",
+                  kMakeBullet},
+      PeerLibrary{"fcl", kFclVersion, "signed distance (GJK, EPA), double precision", kMakeFcl}};
+  return kLibraries;
+}
+
+}  // namespace palpate::runner::evidence

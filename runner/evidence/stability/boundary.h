@@ -1,0 +1,205 @@
+#pragma once
+// The stability boundary of a haptic loop: by simulation, and the passivity condition of theory.
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "protocols/protocol.h"
+#include "rendering/reach.h"
+#include "rendering/renderer.h"
+#include "rendering/scene.h"
+
+namespace palpate::runner::evidence {
+
+// Simulation of the sampled closed loop of hand, two devices at the ends of a stylus and renderer:
+// does a contact come to rest or oscillate? For studies, not for the servo.
+
+/// The hand's impedance at each end of the stylus.
+struct EndImpedance {
+  double stiffness = 0;  ///< N/m
+  double damping = 0;    ///< N s/m
+  double mass = 0;       ///< kg
+};
+
+struct LoopSettings {
+  double rate = 1000;     ///< Hz
+  double mass = 0.1;      ///< kg, of each end
+  double damping = 0.25;  ///< N s/m, viscous, of each end
+  double friction = 0;    ///< N, Coulomb, of each end
+  double resolution = 0;  ///< m, of each end's reading; 0: exact
+  int delay = 0;          ///< ticks from a reading to its force; 0: within the same tick
+  EndImpedance hand;
+  bool passivity_controller = false;
+  std::optional<rendering::Reach> reach = std::nullopt;  ///< of the virtual stylus
+
+  /// Whether forces are linear in the motion during contact, so that a swing grows or shrinks
+  /// forever.
+  bool linear() const { return friction == 0 && resolution == 0 && !passivity_controller; }
+};
+
+/// The contact that is pressed along -z; each end of the stylus moves along z only.
+enum class ContactCase {
+  wall,         ///< a plane, met by the tip
+  edge,         ///< a cube's edge: the ray lies across it, the point touches a face near it
+  sphere,       ///< met by the tip (point), by the side (ray)
+  two_objects,  ///< the ray lies across two edges; the point is in a groove between two walls
+  body,         ///< a body of 10 g that can move and lies on a plane, met by the tip
+};
+inline constexpr ContactCase kContactCases[] = {ContactCase::wall, ContactCase::edge,
+                                                ContactCase::sphere, ContactCase::two_objects,
+                                                ContactCase::body};
+const char* to_string(ContactCase contact_case);
+
+/// A scene and the equilibrium of the stylus in it.
+class LoopScene {
+ public:
+  LoopScene(ContactCase contact_case, protocols::RendererKind renderer,
+            const stimuli::Material& material);
+
+  const rendering::Scene& scene() const { return scene_; }
+  const rendering::Renderer& renderer() const { return *renderer_; }
+  const rendering::LineProbe& rest() const { return rest_; }  ///< 1 mm deep, m
+  /// N along z on each end at rest, and the number of objects touched.
+  double force_tip() const { return force_tip_; }
+  double force_tail() const { return force_tail_; }
+  int contacts() const { return contacts_; }
+
+ private:
+  const rendering::Renderer* renderer_;
+  rendering::Scene scene_;
+  rendering::LineProbe rest_;
+  double force_tip_ = 0, force_tail_ = 0;
+  int contacts_ = 0;
+};
+
+/// Swings are of the contact (its force over its stiffness), peak to peak, m.
+struct LoopOutcome {
+  bool stable = false;
+  double initial_swing = 0;  ///< at the release
+  double early_swing = 0;    ///< in the second quarter of the run
+  double late_swing = 0;     ///< in the last quarter; infinite: it diverged
+  double floor = 0;          ///< a smaller swing counts as rest
+  std::uint64_t ticks = 0;
+};
+
+/// Whether a swing has come to rest. A limit cycle, which neither grows nor rests, is unstable.
+enum class Verdict {
+  stable,
+  unstable,
+  open,  ///< it shrinks and needs a longer run
+};
+Verdict verdict_on(const LoopOutcome& so_far, bool linear);
+
+/// Releases the stylus 0.1 mm (tip) and 0.06 mm (tail) from equilibrium, under the constant force
+/// that holds it there. Each end is integrated exactly (matrix exponential) under a force held over
+/// the tick. Stable: the final swing is within three steps of the resolution, or within a hundredth
+/// of the initial swing, or still shrinks. It runs 40 periods or, if that is inconclusive, up to 64
+/// times as long.
+LoopOutcome run_loop(const LoopSettings& settings, const LoopScene& scene);
+
+/// A loop without the two quantities that span the boundary: stiffness and physical damping.
+struct LoopCase {
+  ContactCase contact_case = ContactCase::wall;
+  protocols::RendererKind renderer = protocols::RendererKind::point;
+  LoopSettings settings;       ///< the damping is ignored
+  double virtual_damping = 0;  ///< N s/m, of the material
+  /// Stiffness of a layer half as deep as the contact, as a share of the surface's; 0: none.
+  double layer_share = 0;
+  /// The mass of each end is chosen so that it oscillates 60 times more slowly than the sampling
+  /// rate: the case of the theory, which is independent of the mass. False: settings.mass.
+  bool heavy = false;
+};
+
+struct BoundaryPoint {
+  double stiffness = 0;  ///< N/m
+  double measured = 0;   ///< N s/m, smallest stable damping of each end; 0: stable without damping
+  double theory = 0;     ///< N s/m, passive with any hand
+  /// The theory applies: friction dissipates the effect of quantisation (K <= 2 f_c / Delta).
+  bool promised = true;
+
+  /// Unstable although the theory promises passivity.
+  bool unsafe() const { return promised && measured > 1.001 * theory; }
+};
+
+/// K (T/2 + t_d) + |B|, with the effective K and B: of surface and layer together, and through the
+/// lever of a reach, for contact at the virtual tip. Colgate & Schenkel 1997.
+double passive_damping(const LoopCase& loop, double stiffness);
+
+/// Whether run_loop() finds rest with this stiffness, N/m, and damping of each end, N s/m.
+bool is_stable(const LoopCase& loop, double stiffness, double damping);
+
+BoundaryPoint boundary_at(const LoopCase& loop, double stiffness);
+
+/// Largest stiffness, N/m, at most 10^7, up to which all are stable with this damping of each end.
+double stiffest_stable(const LoopCase& loop, double damping);
+
+// Compares integrators for the simulated hand, to justify the exact one.
+
+/// m x'' = -b x' - k x + F with F held over each tick, the equation of the program's simulated
+/// hand.
+struct Oscillator {
+  std::string name;
+  double mass = 0.1, damping = 0, stiffness = 0;  ///< kg, N s/m, N/m
+};
+
+/// Accuracy and cost of one integrator.
+struct IntegratorRow {
+  std::string oscillator, method;  ///< explicit, semi-implicit, implicit, exact
+  int steps = 1;                   ///< a tick
+  double ns_per_tick = 0;
+  /// m, largest over 500 ticks with a random force at each, against the closed form in extended
+  /// precision; infinite: it diverged.
+  double error = 0;
+};
+
+/// Each method at 1 kHz with 1 to 1024 steps a tick (exact: 1), on three oscillators: a relaxed
+/// hand, a stiff one and an overdamped one. \param now_ns  a clock
+std::vector<IntegratorRow> compare_integrators(const std::function<double()>& now_ns);
+
+// Whether a tool pressed into a soft body comes to rest, although the body has slower steps than
+// the servo: over moduli, contact stiffnesses, rates of the body, and tools.
+
+struct SoftCase {
+  double young = 20000;    ///< Pa
+  double stiffness = 800;  ///< N/m, of the spring between tool and surface
+  double rate = 250;       ///< Hz, of the body's steps
+  double radius = 0.002;   ///< m, of the tool, which is upright on the body
+  double poisson = 0.45;
+  double damping = 0.01;  ///< s, of the body
+  // The path of the tool's tip:
+  double x = 0.0003, y = 0.0002;  ///< m, off the middle of the slab
+  double depth = 0.003;           ///< m, final depth of the virtual tool
+  double speed = 0.02;            ///< m/s, downwards
+};
+
+struct SoftSwing {
+  SoftCase what;
+  double force = 0;      ///< N, mean while it is held
+  double swing = 0;      ///< share of the force: range over the last 0.2 s, or 1 s if undamped
+  double held = 0;       ///< s, duration of holding
+  bool finite = true;    ///< every force was finite
+  bool accepted = true;  ///< scenes allow this rate with this modulus
+  /// Whether it is at rest for a human hand.
+  bool settles() const { return finite && swing <= kAtRest; }
+  static constexpr double kAtRest = 0.01;
+};
+
+/// A slab, 60 x 60 x 30 mm, pressed by an upright tool that is then held still for 1.5 s. If it is
+/// undamped, allowed in scenes and still swings: up to 12.5 s.
+SoftSwing press_and_hold(const SoftCase& what);
+
+/// 1 kPa to 10 MPa, 0.2 to 3 kN/m, 62.5 to 1000 Hz, tools of 2 and 10 mm, with plain and with
+/// nearly incompressible material.
+std::vector<SoftCase> soft_cases();
+/// The same, but each tool presses at a place within 20 mm of the middle, 1 to 6 mm deep, at 5 to
+/// 200 mm/s, drawn with the seed.
+std::vector<SoftCase> soft_cases_elsewhere(std::uint64_t seed);
+
+/// Table of the worst swing for each modulus and rate, with a sentence that sums it up.
+std::string soft_map_text(const std::vector<SoftSwing>& map);
+
+}  // namespace palpate::runner::evidence

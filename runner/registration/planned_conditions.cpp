@@ -1,0 +1,230 @@
+#include "runner/registration/planned_conditions.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+#include <variant>
+
+#include "analysis/report/plan_report.h"
+#include "analysis/text.h"
+#include "data/base/text.h"
+#include "protocols/procedures/procedure.h"
+#include "protocols/tasks/levels.h"
+#include "protocols/tasks/task_plan.h"
+#include "runner/usage_error.h"
+
+namespace palpate::runner::registration {
+namespace {
+
+using analysis::PlannedMeasure;
+using protocols::Protocol;
+using protocols::TaskBlock;
+using protocols::TaskKind;
+
+constexpr const char* kTime = "time";
+
+/// The measures that the analysis finds in a block, as plans name them.
+std::vector<std::string> measures_of(const Protocol& protocol, const TaskBlock& block) {
+  switch (block.task) {
+    case TaskKind::identify:
+      return {kTime, to_string(PlannedMeasure::accuracy)};
+    case TaskKind::compare: {
+      const int side = protocols::side_of_levels(protocol, block);
+      if (!block.level || block.same_different) return {to_string(PlannedMeasure::threshold)};
+      if (side != 0) return {to_string(PlannedMeasure::jnd), to_string(PlannedMeasure::threshold)};
+      return {to_string(PlannedMeasure::jnd), to_string(PlannedMeasure::pse)};
+    }
+    case TaskKind::detect:
+      return {to_string(PlannedMeasure::threshold)};
+    case TaskKind::adjust:
+      return {to_string(PlannedMeasure::pse)};
+    case TaskKind::rate: {
+      const bool numbers = block.level && block.answers.empty();
+      return {to_string(numbers ? PlannedMeasure::exponent : PlannedMeasure::rating)};
+    }
+    case TaskKind::external:
+      break;
+  }
+  return {};
+}
+
+/// Trials with a stimulus and a renderer.
+std::size_t trials_of(const TaskBlock& block) {
+  if (block.procedures.empty()) return static_cast<std::size_t>(block.repetitions);
+  double trials = 0;
+  for (const protocols::ProcedureSpec& spec : block.procedures) {
+    const bool constant = std::holds_alternative<protocols::ConstantStimuli>(spec);
+    trials += constant ? static_cast<double>(protocols::most_trials(spec))
+                       : protocols::expected_trials(spec, protocols::Procedure(spec, 0));
+  }
+  return static_cast<std::size_t>(std::max(1L, std::lround(trials)));
+}
+
+/// Identification: trials with a renderer, of one shape or of all.
+std::size_t trials_of_identification(const Protocol& protocol, const std::vector<int>& blocks,
+                                     bool of_one_shape) {
+  const auto shapes = of_one_shape ? std::size_t{1} : protocol.stimuli.size();
+  if (protocol.blocks.empty()) return static_cast<std::size_t>(protocol.repetitions) * shapes;
+  std::size_t trials = 0;
+  const auto kind = protocol.blocks[static_cast<std::size_t>(blocks.front())].renderers.front();
+  for (const int index : blocks) {
+    const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
+    if (std::ranges::find(block.renderers, kind) == block.renderers.end()) continue;
+    trials += trials_of(block) * (of_one_shape ? 1 : block.stimuli.size());
+  }
+  return trials;
+}
+
+bool is_of_identification(const analysis::PlanRecord& plan) {
+  return plan.measure() == nullptr || plan.measure()->measure == PlannedMeasure::accuracy;
+}
+
+std::string option_of(const std::string& measure) {
+  return measure == kTime ? "--effect" : "--" + measure + "-effect";
+}
+
+void require_measure(const analysis::PlanRecord& plan, const std::string& path,
+                     const Protocol& protocol) {
+  const std::string measure = name_of_measure(plan);
+  if (protocol.blocks.empty()) {
+    if (is_of_identification(plan)) return;
+    throw UsageError(printable(path) + ": /model/measure: expected a plan of times or accuracy " +
+                     "(palpate plan --effect, --accuracy-effect), for shapes are identified; this "
+                     "one is of " +
+                     measure);
+  }
+  if (!conditions_of(protocol, plan).blocks.empty()) return;
+  std::string blocks;
+  std::set<std::string> options;
+  for (const TaskBlock& block : protocol.blocks) {
+    if (block.practice) continue;
+    const std::vector<std::string> names = measures_of(protocol, block);
+    blocks +=
+        (blocks.empty() ? "" : "; ") + ("block '" + block.name + "': ") + analysis::joined(names);
+    for (const std::string& name : names) options.insert(option_of(name));
+  }
+  std::string words;
+  for (const std::string& option : options) words += (words.empty() ? "" : " or ") + option;
+  throw UsageError(printable(path) + ": expected a plan of a measure that the protocol gives (" +
+                   printable(blocks) + "); this one is of " + measure + ": plan again with " +
+                   words);
+}
+
+/// The stimuli that are identified.
+std::vector<std::string> identified(const Protocol& protocol, const std::vector<int>& blocks) {
+  std::set<std::string> names;
+  if (protocol.blocks.empty()) {
+    for (const protocols::StimulusSpec& one : protocol.stimuli) names.insert(one.name);
+  }
+  for (const int index : blocks) {
+    for (const int stimulus : protocol.blocks[static_cast<std::size_t>(index)].stimuli)
+      names.insert(protocol.stimuli[static_cast<std::size_t>(stimulus)].name);
+  }
+  return {names.begin(), names.end()};
+}
+
+void require_shapes(const analysis::StudyModel& model, const std::string& path,
+                    const std::vector<std::string>& shown) {
+  std::vector<std::string> planned = model.shapes;
+  std::ranges::sort(planned);
+  if (planned != shown)
+    throw UsageError(path + ": /model/log_ratio: expected a plan for the protocol's shapes (" +
+                     printable(analysis::joined(shown)) + "); this one is for " +
+                     printable(analysis::joined(planned)));
+}
+
+void require_trials(const analysis::PlanRecord& plan, const std::string& path,
+                    const Protocol& protocol) {
+  const std::size_t trials = trials_of_cell(protocol, plan);
+  if (plan.curve_for(trials) != nullptr) return;
+  std::string others;
+  for (const auto& curve : plan.curves)
+    others += (others.empty() ? "" : ", ") + std::to_string(curve.trials);
+  throw UsageError(
+      path + ": /needed: expected a plan for the protocol's " + std::to_string(trials) +
+      " trials of each " +
+      (plan.times() != nullptr ? "shape with each renderer" : "participant with each condition") +
+      "; this one is for " + others + ": plan again with --trials " + std::to_string(trials));
+}
+
+/// A threshold cannot lie beyond its standard.
+void require_possible(const analysis::PlanRecord& plan, const std::string& path,
+                      const Protocol& protocol) {
+  const analysis::ThresholdStudy* const study = plan.measure();
+  if (study == nullptr || study->measure != PlannedMeasure::threshold) return;
+  for (const int index : conditions_of(protocol, plan).blocks) {
+    const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
+    if (block.task != TaskKind::compare || !block.standard) continue;
+    const auto standard = protocols::own_level(protocol, block, *block.standard);
+    const int side = protocols::side_of_levels(protocol, block);
+    if (!standard || *standard == 0 || side == 0) continue;
+    const double first = 1 + side * study->weber_fraction;  // in standards
+    if (side * (first * std::exp(study->effect / 2) - 1) > 0 &&
+        side * (first * std::exp(-study->effect / 2) - 1) > 0)
+      continue;
+    throw UsageError(printable(path) + ": /model/effect: a threshold that is " +
+                     analysis::effect_in_words(*study) +
+                     " would lie beyond the standard of block '" + block.name +
+                     "'; plan --jnd-effect, of the distance from the standard");
+  }
+}
+
+}  // namespace
+
+bool PlannedConditions::is_second(const protocols::Trial& trial) const {
+  if (!differ) return false;
+  if (by_renderer) return trial.renderer == protocols::RendererKind::ray;
+  return trial.task_block != blocks.front() || trial.stimulus != first_stimulus;
+}
+
+std::string name_of_measure(const analysis::PlanRecord& plan) {
+  return plan.measure() == nullptr ? kTime : to_string(plan.measure()->measure);
+}
+
+PlannedConditions conditions_of(const Protocol& protocol, const analysis::PlanRecord& plan) {
+  PlannedConditions out;
+  const std::string measure = name_of_measure(plan);
+  std::set<protocols::RendererKind> renderers;
+  std::set<std::pair<int, int>> cells;
+  for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
+    const TaskBlock& block = protocol.blocks[i];
+    const std::vector<std::string> names = measures_of(protocol, block);
+    if (block.practice || std::ranges::find(names, measure) == names.end()) continue;
+    const auto index = static_cast<int>(i);
+    if (out.blocks.empty()) out.first_stimulus = block.stimuli.front();
+    out.blocks.push_back(index);
+    renderers.insert(block.renderers.begin(), block.renderers.end());
+    for (const int stimulus : block.stimuli) cells.emplace(index, stimulus);
+  }
+  out.by_renderer = renderers.size() > 1;
+  out.differ = out.by_renderer || (cells.size() > 1 && !is_of_identification(plan));
+  return out;
+}
+
+std::size_t trials_of_cell(const Protocol& protocol, const analysis::PlanRecord& plan) {
+  const std::vector<int> blocks = conditions_of(protocol, plan).blocks;
+  if (is_of_identification(plan))
+    return trials_of_identification(protocol, blocks, plan.times() != nullptr);
+  std::size_t fewest = 0;
+  for (const int index : blocks) {
+    const std::size_t trials = trials_of(protocol.blocks[static_cast<std::size_t>(index)]);
+    fewest = fewest == 0 ? trials : std::min(fewest, trials);
+  }
+  return fewest;
+}
+
+const analysis::PlanRecord::Curve& fitting_curve(const Protocol& protocol,
+                                                 const analysis::PlanRecord& plan) {
+  return *plan.curve_for(trials_of_cell(protocol, plan));
+}
+
+void require_fitting(const analysis::PlanRecord& plan, const std::string& path,
+                     const Protocol& protocol) {
+  require_measure(plan, path, protocol);
+  if (const analysis::StudyModel* const model = plan.times())
+    require_shapes(*model, path, identified(protocol, conditions_of(protocol, plan).blocks));
+  require_trials(plan, path, protocol);
+  require_possible(plan, path, protocol);
+}
+
+}  // namespace palpate::runner::registration

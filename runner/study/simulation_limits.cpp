@@ -1,0 +1,26 @@
+#include "runner/study/simulation_limits.h"
+
+#include <string>
+
+#include "runner/scene_builder.h"
+#include "runner/usage_error.h"
+
+namespace palpate::runner::study {
+
+void check_simulated_participants(int participants) {
+  if (participants < 1 || participants > 100000)
+    throw UsageError("--participants: must be 1 to 100000");
+}
+
+session::LimitedForSimulation fit_to_simulation(protocols::Protocol& protocol,
+                                                const participants::SimulatedSettings& simulated) {
+  session::LimitedForSimulation limited = session::limit_for_simulation(protocol, simulated);
+  std::string reasons;
+  for (const std::string& fault :
+       session::simulation_faults(protocol, StimulusLibrary(protocol), simulated))
+    reasons += "\n" + fault;
+  if (!reasons.empty()) throw UsageError("this protocol cannot be simulated:" + reasons);
+  return limited;
+}
+
+}  // namespace palpate::runner::study

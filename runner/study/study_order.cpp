@@ -1,0 +1,200 @@
+#include "runner/study/study_order.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <cstdio>
+#include <utility>
+
+#include "data/base/checksum.h"
+#include "protocols/tasks/levels.h"
+#include "runner/study/task_words.h"
+
+namespace palpate::runner::study {
+namespace {
+
+using protocols::Protocol;
+using protocols::TaskBlock;
+
+std::string digits_of(double value) {
+  std::array<char, 40> digits{};
+  const int length = std::snprintf(digits.data(), digits.size(), "%.17g", value + 0.0);
+  return {digits.data(), static_cast<std::size_t>(length)};
+}
+
+std::string turn_text(const Quat& q) {
+  std::string out;
+  for (const double part : {q.w, q.x, q.y, q.z}) out += "," + digits_of(part);
+  return out;
+}
+
+OrderRow row_of(const Protocol& protocol, const protocols::Trial& trial) {
+  const Quat& q = trial.orientation;
+  OrderRow row{trial.session,
+               protocols::to_string(trial.renderer),
+               protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name,
+               {q.w, q.x, q.y, q.z}};
+  if (const TaskBlock* const block = protocols::block_of(protocol, trial))
+    row.task = {trial.block, block->name,       trial.track,
+                trial.level, trial.catch_trial, comparison_interval(*block, trial)};
+  return row;
+}
+
+/// Of a protocol without blocks.
+std::vector<OrderRow> rows_of_version_1(const Protocol& protocol, int number) {
+  std::vector<OrderRow> rows;
+  for (const protocols::Trial& trial : protocols::schedule(protocol, number)) {
+    if (!trial.practice) rows.push_back(row_of(protocol, trial));
+  }
+  return rows;
+}
+
+/// The draws of an adaptive block, for as many trials as it may have.
+std::string drawn_lines(const Protocol& protocol, int number, int index) {
+  const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
+  const auto most = static_cast<std::size_t>(protocols::most_trials_of(block)) +
+                    protocols::most_unanswered(block);
+  std::string out;
+  for (std::size_t i = 0; i < most; ++i) {
+    const protocols::DrawnTrial drawn = protocols::drawn_trial(protocol, number, index, i);
+    const bool compares = block.task == protocols::TaskKind::compare && !drawn.catch_trial;
+    out += "trial," + std::to_string(i + 1) + (drawn.catch_trial ? ",1," : ",0,") +
+           std::to_string(compares ? drawn.position + 1 : 0) + turn_text(drawn.orientation) + "\n";
+  }
+  std::size_t rounds = 0;
+  for (const protocols::ProcedureSpec& procedure : block.procedures)
+    rounds = std::max(rounds, protocols::most_trials(procedure));
+  for (std::uint64_t round = 0; round < rounds; ++round) {
+    out += "round," + std::to_string(round + 1);
+    for (const int track : protocols::track_order(protocol, number, index, round))
+      out += "," + std::to_string(track);
+    out += "\n";
+  }
+  return out;
+}
+
+/// An answer by which a block without adaptive levels goes on.
+constexpr protocols::TrialOutcome kAnyAnswer{true, true, true, std::nullopt};
+
+/// The lines of a session's blocks that are analysed. Its adaptive blocks are passed over with some
+/// answers: those after them do not depend on these.
+std::string session_lines(const Protocol& protocol, int number, int session) {
+  std::string out;
+  int block = 0;
+  for (protocols::TaskPlan plan(protocol, number, session); !plan.finished();
+       plan.answered(kAnyAnswer)) {
+    const protocols::Trial& trial = plan.next();
+    const TaskBlock& shown = *protocols::block_of(protocol, trial);
+    if (trial.practice) continue;
+    if (!protocols::is_adaptive(shown)) {
+      out += to_line(row_of(protocol, trial)) + "\n";
+    } else if (trial.block != block) {
+      out += "block," + std::to_string(session) + "," + std::to_string(trial.block) + "," +
+             shown.name + "\n" + drawn_lines(protocol, number, trial.task_block);
+    }
+    block = trial.block;
+  }
+  return out;
+}
+
+std::string joined_in_order(const std::vector<std::string>& names) {
+  std::vector<std::string> seen;
+  for (const std::string& name : names) {
+    if (std::ranges::find(seen, name) == seen.end()) seen.push_back(name);
+  }
+  std::string out;
+  for (const std::string& name : seen) out += (out.empty() ? "" : ", then ") + name;
+  return out;
+}
+
+}  // namespace
+
+std::string to_line(const OrderRow& row) {
+  std::string line = std::to_string(row.session) + "," + row.renderer + "," + row.shape;
+  for (const double part : row.orientation_wxyz) line += "," + digits_of(part);
+  if (!row.task) return line;
+  const OrderRow::Task& task = *row.task;
+  return line + "," + std::to_string(task.block) + "," + task.name + "," +
+         std::to_string(task.track) + "," + (task.level ? digits_of(*task.level) : "") +
+         (task.catch_trial ? ",1," : ",0,") + std::to_string(task.comparison);
+}
+
+std::string fixed_order(const Protocol& protocol, int participant_number) {
+  std::string lines;
+  if (protocol.blocks.empty()) {
+    for (const OrderRow& row : rows_of_version_1(protocol, participant_number))
+      lines += to_line(row) + "\n";
+  }
+  for (int session = 1; !protocol.blocks.empty() && session <= protocol.sessions.count; ++session)
+    lines += session_lines(protocol, participant_number, session);
+  return lines;
+}
+
+std::string order_checksum(const Protocol& protocol, int participant_number) {
+  return checksum_hex(fixed_order(protocol, participant_number));
+}
+
+ExpectedTrials expected_trials(const Protocol& protocol, int participant_number,
+                               const std::vector<ShownTrial>& shown) {
+  ExpectedTrials out;
+  if (protocol.blocks.empty()) {
+    out.rows = rows_of_version_1(protocol, participant_number);
+    out.complete = static_cast<std::size_t>(
+                       std::ranges::count(shown, false, &ShownTrial::practice)) == out.rows.size();
+    return out;
+  }
+  out.complete = true;
+  for (int session = 1; session <= protocol.sessions.count; ++session) {
+    protocols::TaskPlan plan(protocol, participant_number, session);
+    for (const ShownTrial& one : shown) {
+      if (one.row.session != session || plan.finished()) continue;
+      if (!plan.next().practice) out.rows.push_back(row_of(protocol, plan.next()));
+      plan.answered(one.outcome);
+    }
+    out.complete = out.complete && plan.finished();
+  }
+  return out;
+}
+
+std::size_t planned_trials(const Protocol& protocol) {
+  if (protocol.blocks.empty()) return static_cast<std::size_t>(protocols::main_trials(protocol));
+  long long trials = 0;
+  for (const TaskBlock& block : protocol.blocks)
+    trials += block.practice ? 0 : protocols::expected_trials_of(block);
+  return static_cast<std::size_t>(trials);
+}
+
+bool has_adaptive_blocks(const Protocol& protocol) {
+  return std::ranges::any_of(protocol.blocks, [](const TaskBlock& block) {
+    return !block.practice && protocols::is_adaptive(block);
+  });
+}
+
+std::string condition_order(const Protocol& protocol, int participant_number) {
+  std::vector<std::string> names;
+  if (protocol.blocks.empty()) {
+    for (const OrderRow& row : rows_of_version_1(protocol, participant_number))
+      names.push_back(row.renderer);
+  }
+  for (int session = 1; !protocol.blocks.empty() && session <= protocol.sessions.count; ++session) {
+    for (const int index : protocols::blocks_in_order(protocol, participant_number, session)) {
+      const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
+      if (!block.practice) names.push_back(block.name);
+    }
+  }
+  return joined_in_order(names);
+}
+
+std::string condition_order(const std::vector<ShownTrial>& shown) {
+  std::vector<std::string> names;
+  for (const ShownTrial& one : shown) {
+    if (!one.practice) names.push_back(one.row.task ? one.row.task->name : one.row.renderer);
+  }
+  return joined_in_order(names);
+}
+
+int condition_orders(const Protocol& protocol) {
+  if (protocol.blocks.empty()) return protocols::renderer_orders(protocol);
+  return protocols::block_orders(protocol);
+}
+
+}  // namespace palpate::runner::study

@@ -1,0 +1,75 @@
+#pragma once
+// The trials of a participant as far as they are fixed before the first answer, and as they must
+// be after the answers that were given: for a registration, its check, and 'palpate schedule'.
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "protocols/protocol.h"
+#include "protocols/schedule.h"
+#include "protocols/tasks/task_plan.h"
+
+namespace palpate::runner::study {
+
+/// A trial for analysis, without its answer. Practice is left out, as its rounds depend on answers.
+struct OrderRow {
+  int session = 1;
+  std::string renderer, shape;
+  std::array<double, 4> orientation_wxyz{};
+  /// Of a block of tasks.
+  struct Task {
+    int block = 1;     ///< number
+    std::string name;  ///< of the block
+    int track = 1;
+    std::optional<double> level;  ///< none: nothing is varied, or a catch trial
+    bool catch_trial = false;
+    int comparison = 0;  ///< its interval, from 1; 0: none is compared
+    bool operator==(const Task&) const = default;
+  };
+  std::optional<Task> task = std::nullopt;
+  bool operator==(const OrderRow&) const = default;
+};
+
+/// A trial that was shown.
+struct ShownTrial {
+  OrderRow row;
+  bool practice = false;
+  protocols::TrialOutcome outcome = {};
+};
+
+/// "session,renderer,shape,w,x,y,z" with 17 significant digits; of tasks followed by
+/// ",block,name,track,level,catch,comparison".
+std::string to_line(const OrderRow& row);
+
+/// Whatever is fixed for participant number 1, 2, ..., a line each: the trials for analysis; of
+/// blocks whose levels follow the answers the position of the block, its draws and the order of its
+/// tracks.
+std::string fixed_order(const protocols::Protocol& protocol, int participant_number);
+/// The SHA-256 of these lines.
+std::string order_checksum(const protocols::Protocol& protocol, int participant_number);
+
+/// The trials for analysis that a participant must have been shown, given the answers.
+struct ExpectedTrials {
+  std::vector<OrderRow> rows;
+  bool complete = false;  ///< every session came to its end
+};
+/// \param shown  of the participant, in order
+ExpectedTrials expected_trials(const protocols::Protocol& protocol, int participant_number,
+                               const std::vector<ShownTrial>& shown);
+
+/// Trials for analysis of a participant: exactly, or those that adaptive blocks usually take.
+std::size_t planned_trials(const protocols::Protocol& protocol);
+/// Whether answers choose levels of trials for analysis.
+bool has_adaptive_blocks(const protocols::Protocol& protocol);
+
+/// The order in which renderers, or blocks, come: "point, then ray".
+std::string condition_order(const protocols::Protocol& protocol, int participant_number);
+/// The same of trials that were shown.
+std::string condition_order(const std::vector<ShownTrial>& shown);
+/// Participant numbers after which it repeats; 1: it is the same for everybody, or mixed.
+int condition_orders(const protocols::Protocol& protocol);
+
+}  // namespace palpate::runner::study

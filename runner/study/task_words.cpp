@@ -1,0 +1,354 @@
+#include "runner/study/task_words.h"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <cstdio>
+#include <iomanip>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "data/base/random.h"
+#include "protocols/procedures/procedure.h"
+#include "protocols/tasks/levels.h"
+#include "runner/output/outputs.h"
+#include "runner/usage_error.h"
+
+namespace palpate::runner::study {
+namespace {
+
+struct ListedTrial {
+  const protocols::Trial& trial;
+  const protocols::TaskBlock& block;
+  std::string stimulus, level;
+  int comparison = 0;
+  bool example = false;  ///< depends on answers
+};
+
+using protocols::level_text;
+
+ListedTrial listed(const protocols::Protocol& protocol, const protocols::Trial& trial) {
+  const auto& block = *protocols::block_of(protocol, trial);
+  return {trial,
+          block,
+          protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name,
+          trial.level ? protocols::level_text(*trial.level) : "",
+          comparison_interval(block, trial),
+          protocols::is_adaptive(block)};
+}
+
+std::string table_text(const protocols::Protocol& protocol,
+                       const std::vector<protocols::Trial>& trials) {
+  std::ostringstream out;
+  int block = 0;
+  for (const protocols::Trial& trial : trials) {
+    const ListedTrial row = listed(protocol, trial);
+    if (trial.block != block) {
+      block = trial.block;
+      out << (block > 1 ? "\n" : "") << "session " << trial.session << ", block " << block << ", "
+          << row.block.name << "\n";
+      for (const std::string& line : in_words(protocol, row.block)) out << "  " << line << "\n";
+      if (row.example)
+        out << "  answers choose the levels; with those of a participant whose threshold is in "
+               "the middle:\n";
+      out << "  trial  track  renderer  level         comparison  stimulus\n";
+    }
+    out << "  " << std::right << std::setw(5) << trial.trial << std::setw(7) << trial.track << "  "
+        << std::left << std::setw(8) << protocols::to_string(trial.renderer) << "  "
+        << std::setw(12) << (trial.catch_trial ? "catch" : row.level) << "  " << std::setw(10)
+        << (row.comparison > 0 ? std::to_string(row.comparison) : "") << "  " << row.stimulus
+        << "\n";
+  }
+  return out.str();
+}
+
+std::string csv_text(const protocols::Protocol& protocol, int participant,
+                     const std::vector<protocols::Trial>& trials) {
+  std::vector<std::string> columns = schedule_columns();
+  for (const char* more :
+       {"task", "block_name", "track", "level", "catch_trial", "comparison_interval", "example"})
+    columns.emplace_back(more);
+  output::CsvText table(columns, "\r\n");
+  for (const protocols::Trial& trial : trials) {
+    const ListedTrial row = listed(protocol, trial);
+    const Quat& q = trial.orientation;
+    table << participant << trial.session << trial.block << trial.trial
+          << protocols::to_string(trial.renderer) << row.stimulus << q.w << q.x << q.y << q.z
+          << trial.practice << protocol.sha256 << PALPATE_VERSION
+          << protocols::to_string(row.block.task) << row.block.name << trial.track << row.level
+          << trial.catch_trial << (row.comparison > 0 ? std::to_string(row.comparison) : "")
+          << row.example;
+    table.end_row();
+  }
+  return table.text();
+}
+
+std::string json_text(const protocols::Protocol& protocol, int participant,
+                      const std::vector<protocols::Trial>& trials) {
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  for (const protocols::Trial& trial : trials) {
+    const ListedTrial row = listed(protocol, trial);
+    const Quat& q = trial.orientation;
+    nlohmann::ordered_json out = {{"session", trial.session},
+                                  {"block", trial.block},
+                                  {"trial", trial.trial},
+                                  {"task", protocols::to_string(row.block.task)},
+                                  {"block_name", row.block.name},
+                                  {"track", trial.track},
+                                  {"renderer", protocols::to_string(trial.renderer)},
+                                  {"shape", row.stimulus},
+                                  {"level", nullptr},
+                                  {"catch_trial", trial.catch_trial},
+                                  {"comparison_interval", nullptr},
+                                  {"orientation_wxyz", {q.w, q.x, q.y, q.z}},
+                                  {"practice", trial.practice},
+                                  {"example", row.example}};
+    if (trial.level) out["level"] = *trial.level;
+    if (row.comparison > 0) out["comparison_interval"] = row.comparison;
+    rows.push_back(std::move(out));
+  }
+  const nlohmann::ordered_json document = {{"protocol", protocol.name},
+                                           {"protocol_sha256", protocol.sha256},
+                                           {"program_version", PALPATE_VERSION},
+                                           {"participant_number", participant},
+                                           {"trials", rows}};
+  return document.dump(1) + "\n";
+}
+
+std::string joined(const std::vector<double>& values) {
+  std::string text;
+  for (const double value : values) text += (text.empty() ? "" : ", ") + level_text(value);
+  return text;
+}
+
+std::string range_of(const std::vector<double>& values) {
+  if (values.size() <= 8) return joined(values);
+  const auto [least, most] = std::minmax_element(values.begin(), values.end());
+  return std::to_string(values.size()) + " from " + level_text(*least) + " to " + level_text(*most);
+}
+
+std::string words(const protocols::ConstantStimuli& spec) {
+  return "constant stimuli: levels " + range_of(spec.levels) + ", each " +
+         std::to_string(spec.repetitions) + " times";
+}
+
+std::string words(const protocols::Staircase& spec) {
+  std::ostringstream out;
+  out << "staircase: " << spec.down << " down " << spec.up << " up from " << level_text(spec.start)
+      << " within " << level_text(spec.min) << " to " << level_text(spec.max) << ", steps "
+      << joined(spec.steps) << "; ends after ";
+  if (spec.stop_reversals) out << *spec.stop_reversals << " reversals or ";
+  out << spec.stop_trials << " trials; converges at " << std::fixed << std::setprecision(3)
+      << protocols::convergence_point(spec);
+  return out.str();
+}
+
+std::string words(const protocols::QuestPlus& spec) {
+  std::ostringstream out;
+  out << "QUEST+: levels " << range_of(spec.levels) << "; " << spec.threshold.values.size()
+      << " thresholds, " << spec.slope.values.size() << " slopes, " << spec.guess.values.size()
+      << " guess rates, " << spec.lapse.values.size() << " lapse rates; ends after "
+      << spec.stop_trials << " trials";
+  if (spec.stop_entropy_bits)
+    out << " or at an entropy of " << level_text(*spec.stop_entropy_bits) << " bit";
+  return out.str();
+}
+
+std::string words(const protocols::Limits& spec) {
+  return "limits: " + std::to_string(spec.series) + " series from " + level_text(spec.low) +
+         " to " + level_text(spec.high) + " and back, steps of " + level_text(spec.step);
+}
+
+/// Answers as a participant whose threshold is in the middle of the levels.
+bool succeeds(const protocols::Protocol& protocol, const protocols::TaskBlock& block,
+              const protocols::Trial& trial, Random& random) {
+  const double draw = random.unit();
+  if (!trial.level || protocols::levels_of(block).size() < 2) return draw < 0.75;
+  const protocols::PsychometricParticipant typical =
+      protocols::typical_participant(protocol, block);
+  return draw <
+         protocols::psychometric_probability(typical.function, typical.parameters, *trial.level);
+}
+
+struct RecoveredProcedure {
+  const protocols::TaskBlock* block;
+  std::size_t number;  ///< from 1, within the block
+  protocols::PsychometricParticipant participant;
+  double truth;  ///< a level
+  protocols::Recovery recovery;
+};
+
+/// QUEST+ is tried with a participant that fits its model: of its function, in the middle of its
+/// grids.
+protocols::PsychometricParticipant participant_for(const protocols::Protocol& protocol,
+                                                   const protocols::TaskBlock& block,
+                                                   const protocols::ProcedureSpec& procedure) {
+  protocols::PsychometricParticipant participant = protocols::typical_participant(protocol, block);
+  if (const auto* quest = std::get_if<protocols::QuestPlus>(&procedure)) {
+    const auto middle = [](const protocols::ParameterGrid& grid) {
+      return grid.values[grid.values.size() / 2];
+    };
+    participant.function = quest->function;
+    participant.parameters = {middle(quest->threshold), middle(quest->slope),
+                              quest->guess.values.front(), quest->lapse.values.front()};
+  }
+  return participant;
+}
+
+std::vector<RecoveredProcedure> recovered(const protocols::Protocol& protocol, int participants,
+                                          std::uint64_t seed) {
+  std::vector<RecoveredProcedure> all;
+  for (const protocols::TaskBlock& block : protocol.blocks) {
+    for (std::size_t i = 0; i < block.procedures.size(); ++i) {
+      const protocols::ProcedureSpec& procedure = block.procedures[i];
+      if (block.practice || std::holds_alternative<protocols::ConstantStimuli>(procedure)) continue;
+      const auto participant = participant_for(protocol, block, procedure);
+      all.push_back({&block, i + 1, participant, protocols::true_threshold(procedure, participant),
+                     protocols::simulate_recovery(procedure, participant, participants, seed)});
+    }
+  }
+  if (all.empty())
+    throw UsageError(
+        "--recover: expected a protocol of version 2 with a staircase, QUEST+ or limits");
+  return all;
+}
+
+std::string table_text(const std::vector<RecoveredProcedure>& all, int participants,
+                       std::uint64_t seed) {
+  std::string text = std::to_string(participants) +
+                     " SIMULATED participants whose function is known, seed " +
+                     std::to_string(seed) + "; bias and spread on the scale of the procedure\n";
+  for (const RecoveredProcedure& one : all) {
+    std::array<char, 300> line{};
+    std::snprintf(line.data(), line.size(),
+                  "%s, %s\n  true threshold %.6g: bias %.4g (standard error %.2g), spread %.4g, "
+                  "%.1f trials, %d without an estimate\n",
+                  one.block->name.c_str(),
+                  in_words(one.block->procedures[one.number - 1]).substr(0, 150).c_str(), one.truth,
+                  one.recovery.bias, one.recovery.bias_se, one.recovery.spread,
+                  one.recovery.mean_trials, one.recovery.without_estimate);
+    text += line.data();
+  }
+  return text;
+}
+
+}  // namespace
+
+std::string task_schedule_text(const protocols::Protocol& protocol, int participant,
+                               const std::string& format) {
+  const std::vector<protocols::Trial> trials = example_trials(protocol, participant);
+  if (format == "csv") return csv_text(protocol, participant, trials);
+  if (format == "json") return json_text(protocol, participant, trials);
+  return table_text(protocol, trials);
+}
+
+std::string in_words(const protocols::ProcedureSpec& procedure) {
+  return std::visit([](const auto& spec) { return words(spec); }, procedure);
+}
+
+std::vector<std::string> in_words(const protocols::Protocol& protocol,
+                                  const protocols::TaskBlock& block) {
+  const auto name = [&](int i) { return protocol.stimuli[static_cast<std::size_t>(i)].name; };
+  std::string head = std::string(to_string(block.task)) + " ";
+  for (std::size_t i = 0; i < block.stimuli.size(); ++i)
+    head += (i > 0 ? ", " : "") + name(block.stimuli[i]);
+  if (block.standard) head += " with " + name(*block.standard);
+  if (block.task == protocols::TaskKind::compare)
+    head += ", " + std::to_string(block.intervals) + " intervals";
+  if (block.level) head += "; " + block.level->pointer + " varies";
+  if (block.catch_trials > 0)
+    head += "; " + level_text(100 * block.catch_trials) + " % catch trials";
+  if (block.practice) head += "; practice";
+  head += "; " + std::string(protocols::is_adaptive(block) ? "at most " : "") +
+          std::to_string(protocols::most_trials_of(block)) + " trials";
+  const long long expected = protocols::expected_trials_of(block);
+  if (expected != protocols::most_trials_of(block))
+    head += ", usually about " + std::to_string(expected);
+  std::vector<std::string> lines{head};
+  for (const protocols::ProcedureSpec& procedure : block.procedures)
+    lines.push_back(in_words(procedure));
+  return lines;
+}
+
+std::vector<protocols::Trial> example_trials(const protocols::Protocol& protocol, int participant) {
+  std::vector<protocols::Trial> trials;
+  Random random(protocol.seed, {static_cast<std::uint64_t>(participant), 0x5c});
+  for (int session = 1; session <= protocol.sessions.count; ++session) {
+    protocols::TaskPlan plan(protocol, participant, session);
+    while (!plan.finished()) {
+      const protocols::Trial& trial = plan.next();
+      const auto& block = *protocols::block_of(protocol, trial);
+      const bool success = succeeds(protocol, block, trial, random);
+      trials.push_back(trial);
+      plan.answered({success, success, true});
+    }
+  }
+  return trials;
+}
+
+std::vector<std::string> keyboard_parts(const protocols::Protocol& protocol) {
+  constexpr std::size_t kButtons = 8;
+  std::vector<std::string> parts;
+  for (const protocols::TaskBlock& block : protocol.blocks) {
+    if (block.answers.empty()) parts.push_back("numbers of '" + block.name + "'");
+    if (block.answers.size() > kButtons) parts.push_back("answers to '" + block.name + "'");
+    if (block.confidence && block.confidence->scale.size() > kButtons)
+      parts.push_back("confidence of '" + block.name + "'");
+  }
+  for (const protocols::PageSpec& page : protocol.pages) {
+    for (const protocols::PageItem& item : page.items) {
+      const bool typed = item.kind == protocols::PageItem::Kind::text ||
+                         item.kind == protocols::PageItem::Kind::number;
+      if (typed || item.choices.size() > kButtons)
+        parts.push_back("'" + item.name + "' of page '" + page.name + "'");
+    }
+  }
+  return parts;
+}
+
+int comparison_interval(const protocols::TaskBlock& block, const protocols::Trial& trial) {
+  if (block.task != protocols::TaskKind::compare) return 0;
+  for (std::size_t i = 0; i < trial.intervals.size(); ++i) {
+    if (!trial.intervals[i].standard) return static_cast<int>(i) + 1;
+  }
+  return 0;
+}
+
+std::string recovery_text(const protocols::Protocol& protocol, int participants, std::uint64_t seed,
+                          const std::string& format) {
+  const std::vector<RecoveredProcedure> all = recovered(protocol, participants, seed);
+  if (format == "table") return table_text(all, participants, seed);
+  const std::vector<std::string> columns{
+      "block", "procedure", "participants", "seed",        "true_threshold",
+      "bias",  "bias_se",   "spread",       "mean_trials", "without_estimate"};
+  output::CsvText csv(columns, "\r\n");
+  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+  for (const RecoveredProcedure& one : all) {
+    const protocols::Recovery& r = one.recovery;
+    csv << one.block->name << static_cast<int>(one.number) << participants << std::to_string(seed)
+        << one.truth << r.bias << r.bias_se << r.spread << r.mean_trials << r.without_estimate;
+    csv.end_row();
+    rows.push_back({{"block", one.block->name},
+                    {"procedure", one.number},
+                    {"true_threshold", one.truth},
+                    {"slope", one.participant.parameters.slope},
+                    {"guess", one.participant.parameters.guess},
+                    {"lapse", one.participant.parameters.lapse},
+                    {"bias", r.bias},
+                    {"bias_se", r.bias_se},
+                    {"spread", r.spread},
+                    {"mean_trials", r.mean_trials},
+                    {"without_estimate", r.without_estimate}});
+  }
+  if (format == "csv") return csv.text();
+  const nlohmann::ordered_json document{{"protocol", protocol.name},
+                                        {"simulated", true},
+                                        {"participants", participants},
+                                        {"seed", seed},
+                                        {"procedures", rows}};
+  return document.dump(1) + "\n";
+}
+
+}  // namespace palpate::runner::study
