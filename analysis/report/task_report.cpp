@@ -642,27 +642,29 @@ TaskJson least_bound(const TaskGroupComparison& one) {
   return std::max(size(*one.low90), size(*one.high90));
 }
 
-/// A paired comparison by its names.
-void put_comparison(const TaskComparison& one, const ConditionDifference& difference,
-                    TaskJson& place, TaskJson& bound) {
+/// A paired comparison by its names. \param place  where it stands in a root: a new key in a root
+/// moves its other values, so neither place is kept
+template <class Place>
+void put_comparison(const TaskComparison& one, const ConditionDifference& difference, TaskJson& out,
+                    const Place& place) {
   const auto back = [&](double value) { return one.logarithms ? std::exp(value) : value; };
   const PairedEvidence evidence = evidence_of(difference.mean, difference.t_test);
   const auto& ends = difference.t_test.log_ratio_ci95;
   const auto end = [&](const std::optional<Interval>& of, bool low) {
     return of ? finite(back(low ? of->low : of->high)) : TaskJson(nullptr);
   };
-  place.update({{one.logarithms ? "ratio" : "difference", finite(back(difference.mean))},
-                {"ci95_low", end(ends, true)},
-                {"ci95_high", end(ends, false)},
-                {"ci90_low", end(evidence.ci90, true)},
-                {"ci90_high", end(evidence.ci90, false)},
-                {"t", maybe(difference.t_test.t)},
-                {"p", maybe(difference.t_test.p)},
-                {"p_holm", maybe(difference.t_test.p_holm)},
-                {"wilcoxon_p", maybe(difference.wilcoxon.p)},
-                {"bf10", maybe(evidence.bayes_factor)},
-                {"n", difference.n_pairs}});
-  bound["least_bound"] = maybe(evidence.least_bound);
+  place(out).update({{one.logarithms ? "ratio" : "difference", finite(back(difference.mean))},
+                     {"ci95_low", end(ends, true)},
+                     {"ci95_high", end(ends, false)},
+                     {"ci90_low", end(evidence.ci90, true)},
+                     {"ci90_high", end(evidence.ci90, false)},
+                     {"t", maybe(difference.t_test.t)},
+                     {"p", maybe(difference.t_test.p)},
+                     {"p_holm", maybe(difference.t_test.p_holm)},
+                     {"wilcoxon_p", maybe(difference.wilcoxon.p)},
+                     {"bf10", maybe(evidence.bayes_factor)},
+                     {"n", difference.n_pairs}});
+  place(out["equivalence"])["least_bound"] = maybe(evidence.least_bound);
 }
 
 /// The name of a compared condition: BLOCK, of several stimuli in a block BLOCK.STIMULUS.
@@ -697,7 +699,7 @@ void put_conditions(const TaskAnalysis& analysis, TaskJson& out) {
         at = &(*at)[short_condition(analysis, one, one.conditions[difference.condition])];
         return renderers.size() > 1 ? (*at)[one.renderer] : *at;
       };
-      put_comparison(one, difference, place(out), place(out["equivalence"]));
+      put_comparison(one, difference, out, place);
     }
   }
 }
@@ -764,7 +766,7 @@ TaskJson named_json(const TaskAnalysis& analysis) {
             named_place(root, analysis, one.measure, one.task, one.block_name, one.shape);
         return one.conditions.size() > 2 ? all[compared] : all;
       };
-      put_comparison(one, difference, place(out), place(out["equivalence"]));
+      put_comparison(one, difference, out, place);
     }
   }
   put_conditions(analysis, out);

@@ -286,7 +286,9 @@ double share_of_trade_offs(int studies, double loss, double time_outs, double ga
           raw.shape = shape;
           raw.timed_out = random.unit() < time_outs;
           raw.correct = !raw.timed_out && random.unit() < ability - (ray ? loss : 0);
-          raw.response = raw.timed_out ? "" : raw.correct ? shape : "other";
+          raw.response = raw.timed_out ? std::string_view()
+                         : raw.correct ? std::string_view(shape)
+                                       : "other";
           raw.trial = ++trial;
           raw.response_time =
               raw.timed_out ? 30 : std::exp(2 + (ray ? own_gain : 0) + 0.4 * random.normal());
