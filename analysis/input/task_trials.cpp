@@ -201,25 +201,6 @@ TaskTrial read_trial(TaskRow& row) {
   return trial;
 }
 
-}  // namespace
-
-bool has_task_trials(const std::string& path, const std::string& protocol) {
-  CsvReader reader(path);
-  const Columns columns = read_header(reader);
-  if (!columns.contains("task")) return false;
-  std::vector<protocols::Fault> faults;
-  bool has_others = false;
-  while (reader.next()) {
-    const TaskRow row(path, columns, reader, faults);
-    if (!is_protocol(protocol, row.value("protocol_name"), row.value("protocol_sha256"))) continue;
-    if (!row.value("task").empty()) return true;
-    has_others = true;
-  }
-  return !has_others;
-}
-
-namespace {
-
 /// Puts the trials of each track in their order, in the places that they have.
 void order_trials(std::vector<TaskTrial>& trials) {
   using Track =
@@ -276,6 +257,21 @@ void warn_of_alike_names(TaskTable& table) {
 }
 
 }  // namespace
+
+bool has_task_trials(const std::string& path, const std::string& protocol) {
+  CsvReader reader(path);
+  const Columns columns = read_header(reader);
+  if (!columns.contains("task")) return false;
+  std::vector<protocols::Fault> faults;
+  bool has_others = false;
+  while (reader.next()) {
+    const TaskRow row(path, columns, reader, faults);
+    if (!is_protocol(protocol, row.value("protocol_name"), row.value("protocol_sha256"))) continue;
+    if (!row.value("task").empty()) return true;
+    has_others = true;
+  }
+  return !has_others;
+}
 
 TaskTable read_task_trials_csv(const std::string& path, const std::string& protocol,
                                const std::vector<ProtocolText>& protocols) {

@@ -257,6 +257,7 @@ constexpr std::array kMeasures = {PlannedMeasure::jnd,       PlannedMeasure::pse
 ThresholdStudy read_measure(ObjectReader& reader) {
   ThresholdStudy study;
   std::vector<std::pair<const char*, PlannedMeasure>> names;
+  names.reserve(kMeasures.size());
   for (const PlannedMeasure one : kMeasures) names.emplace_back(to_string(one), one);
   reader.choice("measure", study.measure, names, Presence::required);
   reader.number("effect", study.effect, {-kMostSd, kMostSd}, Presence::required);

@@ -18,12 +18,27 @@
 #include "analysis/text.h"
 
 namespace palpate::analysis {
-
 namespace {
 
 constexpr std::size_t kPageWidth = 100;
 constexpr std::size_t kNameColumns = 24;   // largest width of a name in a table
 constexpr std::size_t kValueColumns = 70;  // largest width of a text in the provenance table
+
+Json times(const TimesCell& cell) {
+  Json out;
+  put_status(out, cell.n_participants == 0   ? "no trial has a usable time"
+                  : cell.n_participants == 1 ? "one participant has no standard deviation"
+                                             : "");
+  out["n_participants"] = cell.n_participants;
+  out["n_trials"] = cell.n_trials;
+  out["mean_of_participant_means"] = number(cell.mean_of_participant_means);
+  out["sd_of_participant_means"] = number(cell.sd_of_participant_means);
+  out["mean_of_participant_medians"] = number(cell.mean_of_participant_medians);
+  out["geomean_of_participant_geomeans"] = number(cell.geomean_of_participant_geomeans);
+  out["mean_of_participant_mean_logs"] = number(cell.mean_of_participant_mean_logs);
+  out["sd_of_participant_mean_logs"] = number(cell.sd_of_participant_mean_logs);
+  return out;
+}
 
 std::string repeated(const char* what, std::size_t times) {
   std::string out;
@@ -86,66 +101,9 @@ void put_text_table(std::string& out, const Table& table) {
   for (const std::string& note : table.notes) put_wrapped(out, note, "  ");
 }
 
-}  // namespace
-
-std::string table_text(const Table& table) {
-  std::string out;
-  put_text_table(out, table);
-  return out;
-}
-
-std::string paragraph_text(const std::string& text) {
-  std::string out;
-  put_wrapped(out, text, "");
-  return out;
-}
-
-std::string report_text(const Analysis& analysis) {
-  std::string out;
-  const std::string label = simulated_label(analysis.table.simulated);
-  if (!label.empty()) {
-    out += repeated("═", kPageWidth) + "\n";
-    put_wrapped(
-        out,
-        label + (analysis.table.simulated == Simulated::yes
-                     ? ": all numbers below are from a model of a participant, not from humans."
-                     : ": the numbers below mix simulated participants with humans."),
-        "  ");
-    out += repeated("═", kPageWidth) + "\n\n";
-  }
-  put_wrapped(out, conclusion(analysis), "");
-  const Counts& counts = analysis.description.counts;
-  put_wrapped(out,
-              counted(counts.n_participants, "participant", "participants") + ", " +
-                  counted(counts.n_trials, "trial", "trials") + ", " +
-                  fixed(100 * counts.accuracy.value_or(0), 1) + " % correct; " +
-                  counted(counts.n_used_for_times, "time", "times") + " used.",
-              "");
-  for (const std::string& warning : analysis.warnings) {
-    put_wrapped(out, "Warning: " + warning, "");
-  }
-  for (const Table& table : all_tables(analysis)) {
-    out += "\n";
-    put_text_table(out, table);
-  }
-  const std::vector<std::string> sentences = sentences_to_quote(analysis);
-  if (!sentences.empty()) out += "\nTo quote\n";
-  for (const std::string& sentence : sentences) put_wrapped(out, sentence, "  ");
-  return out;
-}
-
-namespace {
-
 void put_log_ratio_ci95(Json& out, const std::optional<Interval>& interval) {
   put_interval(out, "log_ratio_ci95", interval);
   put_reduction_ci95(out, "percent_reduction", interval);
-}
-
-Json counts(const Counts& counts) {
-  return {{"n_participants", counts.n_participants}, {"n_trials", counts.n_trials},
-          {"n_correct", counts.n_correct},           {"n_timeouts", counts.n_timeouts},
-          {"n_too_fast", counts.n_too_fast},         {"n_used_for_times", counts.n_used_for_times},
-          {"accuracy", number(counts.accuracy)}};
 }
 
 Json accuracy(const AccuracyCell& cell) {
@@ -161,20 +119,11 @@ Json accuracy(const AccuracyCell& cell) {
   return out;
 }
 
-Json times(const TimesCell& cell) {
-  Json out;
-  put_status(out, cell.n_participants == 0   ? "no trial has a usable time"
-                  : cell.n_participants == 1 ? "one participant has no standard deviation"
-                                             : "");
-  out["n_participants"] = cell.n_participants;
-  out["n_trials"] = cell.n_trials;
-  out["mean_of_participant_means"] = number(cell.mean_of_participant_means);
-  out["sd_of_participant_means"] = number(cell.sd_of_participant_means);
-  out["mean_of_participant_medians"] = number(cell.mean_of_participant_medians);
-  out["geomean_of_participant_geomeans"] = number(cell.geomean_of_participant_geomeans);
-  out["mean_of_participant_mean_logs"] = number(cell.mean_of_participant_mean_logs);
-  out["sd_of_participant_mean_logs"] = number(cell.sd_of_participant_mean_logs);
-  return out;
+Json counts(const Counts& counts) {
+  return {{"n_participants", counts.n_participants}, {"n_trials", counts.n_trials},
+          {"n_correct", counts.n_correct},           {"n_timeouts", counts.n_timeouts},
+          {"n_too_fast", counts.n_too_fast},         {"n_used_for_times", counts.n_used_for_times},
+          {"accuracy", number(counts.accuracy)}};
 }
 
 /// What the test says for no difference. \param name  of the 90 % interval
@@ -328,61 +277,6 @@ Json provenance(const Provenance& from) {
                                                       : Json(from.protocol_sha256)}};
 }
 
-}  // namespace
-
-std::string report_json(const Analysis& analysis) {
-  const TrialTable& table = analysis.table;
-  const Description& description = analysis.description;
-  Json out;
-  out["version"] = 1;
-  out["simulated"] =
-      table.simulated == Simulated::mixed ? Json("mixed") : Json(table.simulated == Simulated::yes);
-  out["source"] = table.provenance.source;
-  out["program_version"] = analysis.program_version;
-  out["protocol"] = provenance(table.provenance);
-  out["observer_sha256"] = table.provenance.observer_sha256.empty()
-                               ? Json(nullptr)
-                               : Json(table.provenance.observer_sha256);
-  out["recorded_with"] = table.provenance.program_versions;
-  out["settings"] = {{"too_fast_s", analysis.settings.too_fast}};
-  out["warnings"] = analysis.warnings;
-  out["counts"] = counts(description.counts);
-  for (std::size_t r = 0; r < table.renderers.size(); ++r) {
-    const std::string& renderer = table.renderers[r];
-    for (std::size_t s = 0; s < table.shapes.size(); ++s) {
-      const std::string& shape = table.shapes[s];
-      out["accuracy"][renderer][shape] = accuracy(description.accuracy[r][s]);
-      Json& row = out["confusion"][renderer][shape];
-      for (std::size_t a = 0; a < table.answers.size(); ++a) {
-        row[table.answers[a]] = description.confusion[r][s][a];
-      }
-      row["no_response"] = description.confusion[r][s].back();
-      out["times"][renderer][shape] = times(description.times[r][s]);
-    }
-  }
-  put_accuracy_differences(out["accuracy_comparison"], analysis.comparisons.front().accuracy,
-                           table.shapes);
-  if (analysis.time_outs.any) out["time_outs"] = time_outs_json(analysis);
-  put_comparisons(out, analysis);
-  out["rm_anova"] = anova_json(analysis.rm_anova, table);
-  out["mixed_model"] = mixed_model_json(analysis);
-  out["mixed_model_by_shape"] = shape_slope_json(analysis);
-  out["speed_accuracy"] = speed_accuracy_json(analysis.comparisons.front(), table);
-  out["practice"] = practice_json(analysis);
-  for (std::size_t r = 0; r < table.renderers.size(); ++r) {
-    const Exclusions& lost = analysis.exclusions[r];
-    out["exclusions"][table.renderers[r]] = {{"n_trials", lost.n_trials},
-                                             {"n_timeouts", lost.n_timeouts},
-                                             {"n_wrong", lost.n_wrong},
-                                             {"n_correct_too_fast", lost.n_too_fast},
-                                             {"n_used_for_times", lost.n_used}};
-  }
-  // Replace invalid UTF-8 from a file, so that the JSON is valid.
-  return out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-}
-
-namespace {
-
 constexpr double kSignificanceLevel = 0.05;
 constexpr std::size_t kMostCards = 12, kMostRowsOfCards = 4;
 
@@ -452,40 +346,6 @@ void put_card(std::string& out, const PairedShape& shape, const CensoredEstimate
   }
   out += "</small></li>\n";
 }
-
-}  // namespace
-
-void put_reduction_cards(std::string& out, const Analysis& analysis) {
-  const std::vector<Comparison>& all = analysis.comparisons;
-  const std::size_t rows = std::min(all.size(), kMostRowsOfCards);
-  const std::size_t n = std::min(analysis.table.shapes.size(), kMostCards);
-  const std::size_t tests = number_of_tests(all);
-  for (std::size_t c = 0; c < rows; ++c) {
-    std::string compared = with_renderer(analysis, "against");
-    if (all.size() > 1) {
-      compared = "with " + with_article(printable(all[c].pair.renderer, 80)) + " " + compared;
-      out += "<p class=\"study\">" + escaped(compared) + "</p>\n";
-    }
-    out += "<ul class=\"cards\" aria-label=\"Reduction of the time " + escaped(compared) +
-           ", by shape\">\n";
-    for (std::size_t s = 0; s < n; ++s) {
-      const std::string& name = analysis.table.shapes[s];
-      put_card(out, all[c].shapes[s], all[c].censored.empty() ? nullptr : &all[c].censored[s], name,
-               paper_reduction(all[c].pair, name), tests);
-    }
-    out += "</ul>\n";
-  }
-  if (n < analysis.table.shapes.size()) {
-    out += "<p class=\"note\">The first " + std::to_string(n) + " of " +
-           std::to_string(analysis.table.shapes.size()) + " shapes.</p>\n";
-  }
-  if (rows < all.size()) {
-    out += "<p class=\"note\">The first " + std::to_string(rows) + " of " +
-           std::to_string(all.size()) + " comparisons.</p>\n";
-  }
-}
-
-namespace {
 
 constexpr std::size_t kMostProtocol = 200'000;  // bytes
 
@@ -728,6 +588,133 @@ class Report {
 };
 
 }  // namespace
+
+std::string table_text(const Table& table) {
+  std::string out;
+  put_text_table(out, table);
+  return out;
+}
+
+std::string paragraph_text(const std::string& text) {
+  std::string out;
+  put_wrapped(out, text, "");
+  return out;
+}
+
+std::string report_text(const Analysis& analysis) {
+  std::string out;
+  const std::string label = simulated_label(analysis.table.simulated);
+  if (!label.empty()) {
+    out += repeated("═", kPageWidth) + "\n";
+    put_wrapped(
+        out,
+        label + (analysis.table.simulated == Simulated::yes
+                     ? ": all numbers below are from a model of a participant, not from humans."
+                     : ": the numbers below mix simulated participants with humans."),
+        "  ");
+    out += repeated("═", kPageWidth) + "\n\n";
+  }
+  put_wrapped(out, conclusion(analysis), "");
+  const Counts& counts = analysis.description.counts;
+  put_wrapped(out,
+              counted(counts.n_participants, "participant", "participants") + ", " +
+                  counted(counts.n_trials, "trial", "trials") + ", " +
+                  fixed(100 * counts.accuracy.value_or(0), 1) + " % correct; " +
+                  counted(counts.n_used_for_times, "time", "times") + " used.",
+              "");
+  for (const std::string& warning : analysis.warnings) {
+    put_wrapped(out, "Warning: " + warning, "");
+  }
+  for (const Table& table : all_tables(analysis)) {
+    out += "\n";
+    put_text_table(out, table);
+  }
+  const std::vector<std::string> sentences = sentences_to_quote(analysis);
+  if (!sentences.empty()) out += "\nTo quote\n";
+  for (const std::string& sentence : sentences) put_wrapped(out, sentence, "  ");
+  return out;
+}
+
+std::string report_json(const Analysis& analysis) {
+  const TrialTable& table = analysis.table;
+  const Description& description = analysis.description;
+  Json out;
+  out["version"] = 1;
+  out["simulated"] =
+      table.simulated == Simulated::mixed ? Json("mixed") : Json(table.simulated == Simulated::yes);
+  out["source"] = table.provenance.source;
+  out["program_version"] = analysis.program_version;
+  out["protocol"] = provenance(table.provenance);
+  out["observer_sha256"] = table.provenance.observer_sha256.empty()
+                               ? Json(nullptr)
+                               : Json(table.provenance.observer_sha256);
+  out["recorded_with"] = table.provenance.program_versions;
+  out["settings"] = {{"too_fast_s", analysis.settings.too_fast}};
+  out["warnings"] = analysis.warnings;
+  out["counts"] = counts(description.counts);
+  for (std::size_t r = 0; r < table.renderers.size(); ++r) {
+    const std::string& renderer = table.renderers[r];
+    for (std::size_t s = 0; s < table.shapes.size(); ++s) {
+      const std::string& shape = table.shapes[s];
+      out["accuracy"][renderer][shape] = accuracy(description.accuracy[r][s]);
+      Json& row = out["confusion"][renderer][shape];
+      for (std::size_t a = 0; a < table.answers.size(); ++a) {
+        row[table.answers[a]] = description.confusion[r][s][a];
+      }
+      row["no_response"] = description.confusion[r][s].back();
+      out["times"][renderer][shape] = times(description.times[r][s]);
+    }
+  }
+  put_accuracy_differences(out["accuracy_comparison"], analysis.comparisons.front().accuracy,
+                           table.shapes);
+  if (analysis.time_outs.any) out["time_outs"] = time_outs_json(analysis);
+  put_comparisons(out, analysis);
+  out["rm_anova"] = anova_json(analysis.rm_anova, table);
+  out["mixed_model"] = mixed_model_json(analysis);
+  out["mixed_model_by_shape"] = shape_slope_json(analysis);
+  out["speed_accuracy"] = speed_accuracy_json(analysis.comparisons.front(), table);
+  out["practice"] = practice_json(analysis);
+  for (std::size_t r = 0; r < table.renderers.size(); ++r) {
+    const Exclusions& lost = analysis.exclusions[r];
+    out["exclusions"][table.renderers[r]] = {{"n_trials", lost.n_trials},
+                                             {"n_timeouts", lost.n_timeouts},
+                                             {"n_wrong", lost.n_wrong},
+                                             {"n_correct_too_fast", lost.n_too_fast},
+                                             {"n_used_for_times", lost.n_used}};
+  }
+  // Replace invalid UTF-8 from a file, so that the JSON is valid.
+  return out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+void put_reduction_cards(std::string& out, const Analysis& analysis) {
+  const std::vector<Comparison>& all = analysis.comparisons;
+  const std::size_t rows = std::min(all.size(), kMostRowsOfCards);
+  const std::size_t n = std::min(analysis.table.shapes.size(), kMostCards);
+  const std::size_t tests = number_of_tests(all);
+  for (std::size_t c = 0; c < rows; ++c) {
+    std::string compared = with_renderer(analysis, "against");
+    if (all.size() > 1) {
+      compared = "with " + with_article(printable(all[c].pair.renderer, 80)) + " " + compared;
+      out += "<p class=\"study\">" + escaped(compared) + "</p>\n";
+    }
+    out += "<ul class=\"cards\" aria-label=\"Reduction of the time " + escaped(compared) +
+           ", by shape\">\n";
+    for (std::size_t s = 0; s < n; ++s) {
+      const std::string& name = analysis.table.shapes[s];
+      put_card(out, all[c].shapes[s], all[c].censored.empty() ? nullptr : &all[c].censored[s], name,
+               paper_reduction(all[c].pair, name), tests);
+    }
+    out += "</ul>\n";
+  }
+  if (n < analysis.table.shapes.size()) {
+    out += "<p class=\"note\">The first " + std::to_string(n) + " of " +
+           std::to_string(analysis.table.shapes.size()) + " shapes.</p>\n";
+  }
+  if (rows < all.size()) {
+    out += "<p class=\"note\">The first " + std::to_string(rows) + " of " +
+           std::to_string(all.size()) + " comparisons.</p>\n";
+  }
+}
 
 std::string report_html(const Analysis& analysis, const StudyRecord& record) {
   return Report(analysis, record).html();

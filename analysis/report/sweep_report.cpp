@@ -13,7 +13,6 @@
 #include "analysis/text.h"
 
 namespace palpate::analysis {
-
 namespace {
 
 std::string link_of(const std::string& figure) {
@@ -48,28 +47,6 @@ Table sweep_source_table(const SweepAnalysis& analysis) {
       {"parameters", joined(sweep.parameters)}};
   return table;
 }
-
-}  // namespace
-
-std::string sweep_html(const SweepAnalysis& analysis) {
-  HtmlPage page(sweep_answer(analysis), "SIMULATED PARTICIPANTS");
-  page.put_banner(
-      "SIMULATED PARTICIPANTS: all numbers below are from a model of a participant, not from "
-      "humans.");
-  put_list(page.below_title(), analysis.notes);
-  if (analysis.pattern) put_pattern(page, analysis);
-  for (const Figure& figure : sweep_figures(analysis))
-    page.put_figure_section(figure, link_of(figure.id));
-  page.begin_section("numbers", "Numbers", "Numbers");
-  for (const Table& table : sweep_tables(analysis)) put_table(page.body(), table);
-  page.end_section();
-  page.begin_section("source", "Source", "Source");
-  put_table(page.body(), sweep_source_table(analysis));
-  page.end_section();
-  return page.html("Made by palpate " + analysis.program_version + ".");
-}
-
-namespace {
 
 using Json = nlohmann::ordered_json;
 
@@ -171,26 +148,6 @@ Json drivers_json(const SweepAnalysis& analysis, const Drivers& drivers) {
   }
   return out;
 }
-
-}  // namespace
-
-std::string sweep_json(const SweepAnalysis& analysis) {
-  Json out;
-  out["version"] = 1;
-  out["simulated"] = true;
-  out["program_version"] = analysis.program_version;
-  out["sweep"] = sweep_source_json(analysis);
-  out["pattern"] = analysis.pattern ? pattern_json(analysis) : Json(nullptr);
-  for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s)
-    out["gains"][analysis.table.shapes[s]] = spread_json(analysis.gains[s]);
-  for (const Drivers& drivers : analysis.drivers)
-    out["drivers"][drivers.output] = drivers_json(analysis, drivers);
-  out["bootstrap_seed"] = analysis.seed;
-  out["notes"] = analysis.notes;
-  return out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
-}
-
-namespace {
 
 constexpr const char* kSimulated = " (SIMULATED PARTICIPANTS)";
 constexpr std::size_t kShownReasons = 20;
@@ -305,6 +262,40 @@ Table reasons_table(const SweepAnalysis& analysis) {
 }
 
 }  // namespace
+
+std::string sweep_html(const SweepAnalysis& analysis) {
+  HtmlPage page(sweep_answer(analysis), "SIMULATED PARTICIPANTS");
+  page.put_banner(
+      "SIMULATED PARTICIPANTS: all numbers below are from a model of a participant, not from "
+      "humans.");
+  put_list(page.below_title(), analysis.notes);
+  if (analysis.pattern) put_pattern(page, analysis);
+  for (const Figure& figure : sweep_figures(analysis))
+    page.put_figure_section(figure, link_of(figure.id));
+  page.begin_section("numbers", "Numbers", "Numbers");
+  for (const Table& table : sweep_tables(analysis)) put_table(page.body(), table);
+  page.end_section();
+  page.begin_section("source", "Source", "Source");
+  put_table(page.body(), sweep_source_table(analysis));
+  page.end_section();
+  return page.html("Made by palpate " + analysis.program_version + ".");
+}
+
+std::string sweep_json(const SweepAnalysis& analysis) {
+  Json out;
+  out["version"] = 1;
+  out["simulated"] = true;
+  out["program_version"] = analysis.program_version;
+  out["sweep"] = sweep_source_json(analysis);
+  out["pattern"] = analysis.pattern ? pattern_json(analysis) : Json(nullptr);
+  for (std::size_t s = 0; s < analysis.table.shapes.size(); ++s)
+    out["gains"][analysis.table.shapes[s]] = spread_json(analysis.gains[s]);
+  for (const Drivers& drivers : analysis.drivers)
+    out["drivers"][drivers.output] = drivers_json(analysis, drivers);
+  out["bootstrap_seed"] = analysis.seed;
+  out["notes"] = analysis.notes;
+  return out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
 
 std::vector<Table> sweep_tables(const SweepAnalysis& analysis) {
   std::vector<Table> out;

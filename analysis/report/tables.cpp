@@ -13,10 +13,135 @@
 #include "analysis/text.h"
 
 namespace palpate::analysis {
-
 namespace {
 
 constexpr std::ptrdiff_t kMostListed = 200;  // shapes in a note
+
+/// "Accuracy, ray − point: 12.1 percentage points, 95 % CI [...], t(5) = 1.30, p = 0.250, n = 6
+/// ..."
+std::string accuracy_sentence(const Comparison& comparison, const std::string& label) {
+  const AccuracyDifference& all = comparison.accuracy.all;
+  const auto& ends = all.test.log_ratio_ci95;
+  if (!all.test.p || !ends) return "";
+  return "Accuracy, " + printable(comparison.pair.renderer) + " − " +
+         printable(comparison.pair.reference) + ": " + fixed(100 * *all.difference, 1) +
+         " percentage points, 95 % CI [" + fixed(100 * ends->low, 1) + ", " +
+         fixed(100 * ends->high, 1) + "], " + test_text(all.test) +
+         ", n = " + std::to_string(all.n) +
+         " (paired t-test of shares correct, mean over shapes; a time-out is wrong" +
+         (comparison.accuracy.depends_on_time_outs ? "; the difference depends on the time-outs"
+                                                   : "") +
+         (label.empty() ? "" : "; " + label) + ").";
+}
+
+std::string percentage_points(const std::optional<double>& share) {
+  return share ? fixed(100 * *share, 1) : kMissing;
+}
+
+/// "3.2": how many times more likely the differences are with an effect than with none.
+std::string bayes_cell(const std::optional<double>& factor) {
+  return factor ? short_number(*factor) : kMissing;
+}
+
+const char* const kBayesNote =
+    "90 % interval: equivalent within registered bounds if it lies inside (two one-sided tests at "
+    "5 %). BF10: Bayes factor for a difference (Rouder et al. 2009, scale 0.707); below 1/3 it "
+    "supports none.";
+
+/// Below nine pairs a Bayes factor cannot support "no difference".
+void add_bayes_notes(std::size_t fewest, Table& table) {
+  table.notes.emplace_back(kBayesNote);
+  if (fewest < kLeastForBayes)
+    table.notes.emplace_back(
+        "With fewer than nine participants BF10 cannot fall below 1/3: it can never support \"no "
+        "difference\".");
+}
+
+std::string odds_ratio(const AccuracyModel& model) {
+  const auto ratio = [](double log_odds) { return number(std::exp(log_odds), 2); };
+  if (!model.undefined.empty()) return kMissing;
+  const std::string value = model.log_odds_ratio ? ratio(*model.log_odds_ratio) : kMissing;
+  if (model.ci95_low && model.ci95_high)
+    return value + " (" + ratio(*model.ci95_low) + " to " + ratio(*model.ci95_high) + ")";
+  if (model.ci95_low) return value + " (at least " + ratio(*model.ci95_low) + ")";
+  if (model.ci95_high) return value + " (at most " + ratio(*model.ci95_high) + ")";
+  return value + " (not determined)";
+}
+
+void add_accuracy_row(const Comparison& comparison, const char* trials,
+                      const AccuracyDifference& one, Table& table) {
+  const auto range = [](const std::optional<Interval>& ends) {
+    return ends ? fixed(100 * ends->low, 1) + " to " + fixed(100 * ends->high, 1)
+                : std::string(kMissing);
+  };
+  const PairedEvidence evidence =
+      one.difference ? evidence_of(*one.difference, one.test) : PairedEvidence{};
+  table.rows.push_back({difference_name(comparison.pair), trials, percentage_points(one.difference),
+                        range(one.test.log_ratio_ci95), range(evidence.ci90),
+                        bayes_cell(evidence.bayes_factor), number(one.test.t, 2),
+                        number(one.test.df, 0), p_or_missing(one.test.p), odds_ratio(one.model),
+                        p_or_missing(one.model.p), std::to_string(one.n)});
+  const std::string name = difference_name(comparison.pair) + ", " + trials + ": ";
+  if (!one.test.undefined.empty()) table.notes.push_back(name + one.test.undefined + ".");
+  if (!one.model.undefined.empty())
+    table.notes.push_back(name + "no model, " + one.model.undefined + ".");
+  std::string left_out;
+  for (const std::string& shape : one.model.left_out)
+    left_out += (left_out.empty() ? "" : "; ") + shape;
+  if (!left_out.empty()) table.notes.push_back(name + "left out of the model: " + left_out + ".");
+}
+
+std::string sentence(const std::string& what, const std::string& reason) {
+  return what + ": " + reason + ".";
+}
+
+/// 100 (exp m - 1): percent change of time for a log ratio m.
+std::string percent_change(const std::optional<double>& log_ratio) {
+  if (!log_ratio) return kMissing;
+  return signed_fixed(100 * std::expm1(*log_ratio), 1) + " %";
+}
+
+std::string learning_note(const std::string& who, const TTest& test,
+                          const std::optional<double>& mean) {
+  if (!mean) return sentence(who, test.undefined);
+  std::string text = who + ": " + percent_change(mean) + " of time per 100 trials";
+  if (test.log_ratio_ci95) {
+    text += " (95 % interval " + percent_change(test.log_ratio_ci95->low) + " to " +
+            percent_change(test.log_ratio_ci95->high) + ")";
+    if (test.t && test.df && test.p) text += ", " + test_text(test);
+  } else {
+    text += "; " + test.undefined;
+  }
+  return text + ".";
+}
+
+/// Standard deviations of the random effects and the residual; the correlation if there is only one
+/// (the JSON has all).
+std::string random_effects_note(const MixedModel& model,
+                                const std::vector<std::string>& renderers) {
+  std::vector<std::string> slopes;
+  for (std::size_t r = 1; r < renderers.size(); ++r) {
+    slopes.push_back(with_article(renderers[r]) + " " + number(model.random_sds[r], 3));
+  }
+  return "Standard deviations of log time: participants' intercepts " +
+         number(model.random_sds[0], 3) + ", their slopes for " + joined(slopes) +
+         (slopes.size() == 1 ? " (correlation " + number(model.random_correlations[0], 2) + ")"
+                             : "") +
+         ", residual " + number(model.residual_sd, 3) + "; log likelihood (REML) " +
+         number(model.log_likelihood_reml, 3) + ", " +
+         counted(model.n_observations, "trial", "trials") + ".";
+}
+
+std::string proportion_of(const TimeOutCell& cell) {
+  return cell.n_trials == 0 ? kMissing : percent(100 * cell.proportion());
+}
+
+std::string limit_of(const TimeOutCell& cell) {
+  if (!cell.lowest_limit) return kMissing;
+  const auto seconds = [](double s) { return fixed(s, s == std::floor(s) ? 0 : 2); };
+  if (*cell.lowest_limit == *cell.highest_limit) return seconds(*cell.lowest_limit) + " s";
+  return seconds(*cell.lowest_limit) + " to " + seconds(*cell.highest_limit) + " s";
+}
 
 }  // namespace
 
@@ -67,27 +192,6 @@ std::string test_sentence(const TTest& test, const EffectSize& effect, std::size
   if (effect.dz) text += ", dz = " + number(effect.dz, 2);
   return text + ", n = " + std::to_string(pairs);
 }
-
-namespace {
-
-/// "Accuracy, ray − point: 12.1 percentage points, 95 % CI [...], t(5) = 1.30, p = 0.250, n = 6
-/// ..."
-std::string accuracy_sentence(const Comparison& comparison, const std::string& label) {
-  const AccuracyDifference& all = comparison.accuracy.all;
-  const auto& ends = all.test.log_ratio_ci95;
-  if (!all.test.p || !ends) return "";
-  return "Accuracy, " + printable(comparison.pair.renderer) + " − " +
-         printable(comparison.pair.reference) + ": " + fixed(100 * *all.difference, 1) +
-         " percentage points, 95 % CI [" + fixed(100 * ends->low, 1) + ", " +
-         fixed(100 * ends->high, 1) + "], " + test_text(all.test) +
-         ", n = " + std::to_string(all.n) +
-         " (paired t-test of shares correct, mean over shapes; a time-out is wrong" +
-         (comparison.accuracy.depends_on_time_outs ? "; the difference depends on the time-outs"
-                                                   : "") +
-         (label.empty() ? "" : "; " + label) + ").";
-}
-
-}  // namespace
 
 std::vector<std::string> sentences_to_quote(const Analysis& analysis) {
   const std::size_t tests = number_of_tests(analysis.comparisons);
@@ -262,67 +366,6 @@ Table times_table(const Analysis& analysis) {
       "between participants."};
   return table;
 }
-
-namespace {
-
-std::string percentage_points(const std::optional<double>& share) {
-  return share ? fixed(100 * *share, 1) : kMissing;
-}
-
-/// "3.2": how many times more likely the differences are with an effect than with none.
-std::string bayes_cell(const std::optional<double>& factor) {
-  return factor ? short_number(*factor) : kMissing;
-}
-
-const char* const kBayesNote =
-    "90 % interval: equivalent within registered bounds if it lies inside (two one-sided tests at "
-    "5 %). BF10: Bayes factor for a difference (Rouder et al. 2009, scale 0.707); below 1/3 it "
-    "supports none.";
-
-/// Below nine pairs a Bayes factor cannot support "no difference".
-void add_bayes_notes(std::size_t fewest, Table& table) {
-  table.notes.emplace_back(kBayesNote);
-  if (fewest < kLeastForBayes)
-    table.notes.emplace_back(
-        "With fewer than nine participants BF10 cannot fall below 1/3: it can never support \"no "
-        "difference\".");
-}
-
-std::string odds_ratio(const AccuracyModel& model) {
-  const auto ratio = [](double log_odds) { return number(std::exp(log_odds), 2); };
-  if (!model.undefined.empty()) return kMissing;
-  const std::string value = model.log_odds_ratio ? ratio(*model.log_odds_ratio) : kMissing;
-  if (model.ci95_low && model.ci95_high)
-    return value + " (" + ratio(*model.ci95_low) + " to " + ratio(*model.ci95_high) + ")";
-  if (model.ci95_low) return value + " (at least " + ratio(*model.ci95_low) + ")";
-  if (model.ci95_high) return value + " (at most " + ratio(*model.ci95_high) + ")";
-  return value + " (not determined)";
-}
-
-void add_accuracy_row(const Comparison& comparison, const char* trials,
-                      const AccuracyDifference& one, Table& table) {
-  const auto range = [](const std::optional<Interval>& ends) {
-    return ends ? fixed(100 * ends->low, 1) + " to " + fixed(100 * ends->high, 1)
-                : std::string(kMissing);
-  };
-  const PairedEvidence evidence =
-      one.difference ? evidence_of(*one.difference, one.test) : PairedEvidence{};
-  table.rows.push_back({difference_name(comparison.pair), trials, percentage_points(one.difference),
-                        range(one.test.log_ratio_ci95), range(evidence.ci90),
-                        bayes_cell(evidence.bayes_factor), number(one.test.t, 2),
-                        number(one.test.df, 0), p_or_missing(one.test.p), odds_ratio(one.model),
-                        p_or_missing(one.model.p), std::to_string(one.n)});
-  const std::string name = difference_name(comparison.pair) + ", " + trials + ": ";
-  if (!one.test.undefined.empty()) table.notes.push_back(name + one.test.undefined + ".");
-  if (!one.model.undefined.empty())
-    table.notes.push_back(name + "no model, " + one.model.undefined + ".");
-  std::string left_out;
-  for (const std::string& shape : one.model.left_out)
-    left_out += (left_out.empty() ? "" : "; ") + shape;
-  if (!left_out.empty()) table.notes.push_back(name + "left out of the model: " + left_out + ".");
-}
-
-}  // namespace
 
 Table accuracy_difference_table(const Analysis& analysis) {
   Table table;
@@ -524,51 +567,6 @@ std::vector<Table> all_tables(const Analysis& analysis) {
 }
 
 // Tables of inferential statistics: speed and accuracy, ANOVA, mixed model, practice.
-
-namespace {
-
-std::string sentence(const std::string& what, const std::string& reason) {
-  return what + ": " + reason + ".";
-}
-
-/// 100 (exp m - 1): percent change of time for a log ratio m.
-std::string percent_change(const std::optional<double>& log_ratio) {
-  if (!log_ratio) return kMissing;
-  return signed_fixed(100 * std::expm1(*log_ratio), 1) + " %";
-}
-
-std::string learning_note(const std::string& who, const TTest& test,
-                          const std::optional<double>& mean) {
-  if (!mean) return sentence(who, test.undefined);
-  std::string text = who + ": " + percent_change(mean) + " of time per 100 trials";
-  if (test.log_ratio_ci95) {
-    text += " (95 % interval " + percent_change(test.log_ratio_ci95->low) + " to " +
-            percent_change(test.log_ratio_ci95->high) + ")";
-    if (test.t && test.df && test.p) text += ", " + test_text(test);
-  } else {
-    text += "; " + test.undefined;
-  }
-  return text + ".";
-}
-
-/// Standard deviations of the random effects and the residual; the correlation if there is only one
-/// (the JSON has all).
-std::string random_effects_note(const MixedModel& model,
-                                const std::vector<std::string>& renderers) {
-  std::vector<std::string> slopes;
-  for (std::size_t r = 1; r < renderers.size(); ++r) {
-    slopes.push_back(with_article(renderers[r]) + " " + number(model.random_sds[r], 3));
-  }
-  return "Standard deviations of log time: participants' intercepts " +
-         number(model.random_sds[0], 3) + ", their slopes for " + joined(slopes) +
-         (slopes.size() == 1 ? " (correlation " + number(model.random_correlations[0], 2) + ")"
-                             : "") +
-         ", residual " + number(model.residual_sd, 3) + "; log likelihood (REML) " +
-         number(model.log_likelihood_reml, 3) + ", " +
-         counted(model.n_observations, "trial", "trials") + ".";
-}
-
-}  // namespace
 
 Table speed_accuracy_table(const Analysis& analysis) {
   const RendererPair& first = analysis.comparisons.front().pair;
@@ -823,21 +821,6 @@ Table renderer_order_table(const Analysis& analysis) {
 }
 
 // Tables of time-outs and of the estimates with time-outs as censored times.
-
-namespace {
-
-std::string proportion_of(const TimeOutCell& cell) {
-  return cell.n_trials == 0 ? kMissing : percent(100 * cell.proportion());
-}
-
-std::string limit_of(const TimeOutCell& cell) {
-  if (!cell.lowest_limit) return kMissing;
-  const auto seconds = [](double s) { return fixed(s, s == std::floor(s) ? 0 : 2); };
-  if (*cell.lowest_limit == *cell.highest_limit) return seconds(*cell.lowest_limit) + " s";
-  return seconds(*cell.lowest_limit) + " to " + seconds(*cell.highest_limit) + " s";
-}
-
-}  // namespace
 
 Table censored_table(const Analysis& analysis) {
   const RendererPair& first = analysis.comparisons.front().pair;

@@ -229,15 +229,6 @@ class TaskPage {
   HtmlPage page_;
 };
 
-}  // namespace
-
-std::string task_report_html(const TaskAnalysis& analysis, const std::string& program_version,
-                             const StudyRecord& record) {
-  return TaskPage(analysis, record).html(program_version);
-}
-
-namespace {
-
 using TaskJson = nlohmann::ordered_json;
 
 TaskJson finite(double value) { return std::isfinite(value) ? TaskJson(value) : TaskJson(nullptr); }
@@ -534,6 +525,13 @@ TaskJson group_json(const TaskGroup& group) {
   return out;
 }
 
+/// The least bound of equivalence: of ratios, on the scale of logarithms.
+TaskJson least_bound(const TaskGroupComparison& one) {
+  if (!one.low90 || !one.high90) return nullptr;
+  const auto size = [&](double end) { return std::abs(one.ratio ? std::log(end) : end); };
+  return std::max(size(*one.low90), size(*one.high90));
+}
+
 TaskJson comparison_json(const TaskComparison& one, bool of_renderers) {
   const char* const condition = of_renderers ? "renderer" : "condition";
   TaskJson out{{"task", one.task}, {"measure", one.measure}};
@@ -633,13 +631,6 @@ TaskJson& named_place(TaskJson& out, const TaskAnalysis& analysis, const std::st
 /// "d_prime_at_2.5": a measure at a level.
 std::string leveled(const std::string& measure, const std::optional<double>& level) {
   return level ? measure + "_at_" + short_number(*level) : measure;
-}
-
-/// The least bound of equivalence: of ratios, on the scale of logarithms.
-TaskJson least_bound(const TaskGroupComparison& one) {
-  if (!one.low90 || !one.high90) return nullptr;
-  const auto size = [&](double end) { return std::abs(one.ratio ? std::log(end) : end); };
-  return std::max(size(*one.low90), size(*one.high90));
 }
 
 /// A paired comparison by its names. \param place  where it stands in a root: a new key in a root
@@ -773,41 +764,6 @@ TaskJson named_json(const TaskAnalysis& analysis) {
   put_means(analysis, out);
   return out;
 }
-
-}  // namespace
-
-std::string task_report_json(const TaskAnalysis& analysis, const std::string& program_version) {
-  TaskJson out{{"version", 1},
-               {"simulated", analysis.table.simulated},
-               {"title", analysis.table.title},
-               {"source", analysis.table.source},
-               {"warnings", analysis.table.warnings},
-               {"program_version", program_version},
-               {"n_trials", analysis.table.trials.size()},
-               {"n_practice", analysis.table.n_practice},
-               {"cells", TaskJson::array()},
-               {"group_results", TaskJson::array()},
-               {"renderer_comparisons", TaskJson::array()},
-               {"condition_comparisons", TaskJson::array()}};
-  for (const TaskCell& cell : analysis.cells) out["cells"].push_back(cell_json(cell));
-  for (const TaskGroup& group : analysis.groups) out["group_results"].push_back(group_json(group));
-  for (const TaskComparison& one : analysis.renderers)
-    out["renderer_comparisons"].push_back(comparison_json(one, true));
-  for (const TaskComparison& one : analysis.conditions)
-    out["condition_comparisons"].push_back(comparison_json(one, false));
-  out["group_model"] = TaskJson::array();
-  for (const TaskGroupModel& one : analysis.group_models.models)
-    out["group_model"].push_back(group_model_json(one));
-  out["group_comparisons"] = TaskJson::array();
-  for (const TaskGroupComparison& one : analysis.group_models.comparisons)
-    out["group_comparisons"].push_back(group_comparison_json(one));
-  out.update(named_json(analysis));
-  if (analysis.identification)
-    out["identification"] = read_ordered_json(report_json(*analysis.identification));
-  return out.dump(1, ' ', false, TaskJson::error_handler_t::replace) + "\n";
-}
-
-namespace {
 
 std::string with_interval(double value, const Interval& interval) {
   return short_number(value) + " [" + short_number(interval.low) + ", " +
@@ -1137,6 +1093,42 @@ std::string group_model_text(const TaskAnalysis& analysis) {
 }
 
 }  // namespace
+
+std::string task_report_html(const TaskAnalysis& analysis, const std::string& program_version,
+                             const StudyRecord& record) {
+  return TaskPage(analysis, record).html(program_version);
+}
+
+std::string task_report_json(const TaskAnalysis& analysis, const std::string& program_version) {
+  TaskJson out{{"version", 1},
+               {"simulated", analysis.table.simulated},
+               {"title", analysis.table.title},
+               {"source", analysis.table.source},
+               {"warnings", analysis.table.warnings},
+               {"program_version", program_version},
+               {"n_trials", analysis.table.trials.size()},
+               {"n_practice", analysis.table.n_practice},
+               {"cells", TaskJson::array()},
+               {"group_results", TaskJson::array()},
+               {"renderer_comparisons", TaskJson::array()},
+               {"condition_comparisons", TaskJson::array()}};
+  for (const TaskCell& cell : analysis.cells) out["cells"].push_back(cell_json(cell));
+  for (const TaskGroup& group : analysis.groups) out["group_results"].push_back(group_json(group));
+  for (const TaskComparison& one : analysis.renderers)
+    out["renderer_comparisons"].push_back(comparison_json(one, true));
+  for (const TaskComparison& one : analysis.conditions)
+    out["condition_comparisons"].push_back(comparison_json(one, false));
+  out["group_model"] = TaskJson::array();
+  for (const TaskGroupModel& one : analysis.group_models.models)
+    out["group_model"].push_back(group_model_json(one));
+  out["group_comparisons"] = TaskJson::array();
+  for (const TaskGroupComparison& one : analysis.group_models.comparisons)
+    out["group_comparisons"].push_back(group_comparison_json(one));
+  out.update(named_json(analysis));
+  if (analysis.identification)
+    out["identification"] = read_ordered_json(report_json(*analysis.identification));
+  return out.dump(1, ' ', false, TaskJson::error_handler_t::replace) + "\n";
+}
 
 std::string task_report_text(const TaskAnalysis& analysis) {
   std::string text;

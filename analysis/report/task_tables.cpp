@@ -12,16 +12,6 @@
 #include "analysis/text.h"
 
 namespace palpate::analysis {
-
-std::string stimulus_of(const std::string& task, const std::string& block,
-                        const std::string& shape) {
-  std::string name;
-  for (const std::string* part : {&task, &block, &shape}) {
-    if (!part->empty()) name += (name.empty() ? "" : ", ") + printable(*part);
-  }
-  return name;
-}
-
 namespace {
 
 constexpr double kClear = 0.05;  // largest Holm-adjusted p that is told as a finding
@@ -169,18 +159,6 @@ Table model_differences_table(const TaskAnalysis& analysis) {
   return table;
 }
 
-}  // namespace
-
-bool has_model(const TaskAnalysis& analysis, const TaskComparison& one) {
-  return std::ranges::any_of(
-      analysis.group_models.comparisons, [&](const TaskGroupComparison& other) {
-        return other.task == one.task && other.block_name == one.block_name &&
-               other.shape == one.shape && other.measure == one.measure;
-      });
-}
-
-namespace {
-
 /// Why a Wilcoxon test beside a t-test may say nothing; empty: it has enough pairs.
 std::string few_pairs_note(const std::vector<TaskComparison>& comparisons) {
   const bool few = std::ranges::any_of(comparisons, [](const TaskComparison& one) {
@@ -258,63 +236,6 @@ Table differences_table(const TaskAnalysis& analysis, bool of_renderers) {
     table.notes.push_back(few);
   return table;
 }
-
-}  // namespace
-
-std::vector<Table> group_tables(const TaskAnalysis& analysis) {
-  std::vector<Table> tables{means_table(analysis), model_differences_table(analysis),
-                            detection_model_table(analysis), differences_table(analysis, true),
-                            differences_table(analysis, false)};
-  std::erase_if(tables, [](const Table& table) { return table.rows.empty(); });
-  return tables;
-}
-
-std::string group_sentence(const TaskGroupComparison& one) {
-  const std::string where = stimulus_of(one.task, one.block_name, one.shape);
-  std::string text = measure_plural(one.measure) +
-                     (one.level ? " at " + short_number(*one.level) : "") +
-                     (where.empty() ? "" : " (" + where + ")") + ", " + pair_of(one) + ": ";
-  if (!one.estimate) return text + "undefined, " + one.undefined;
-  text += short_number(*one.estimate);
-  if (one.low && one.high) {
-    text += ", 95 % CI [" + short_number(*one.low) + ", " + short_number(*one.high) + "]";
-  } else {
-    text += ", 95 % CI " + ends_of(one.low, one.high);
-  }
-  text += ", likelihood ratio " + fixed(*one.likelihood_ratio, 2) + ", " + p_phrase(*one.p);
-  if (one.p_holm && *one.p_holm != *one.p) text += " (" + p_phrase(*one.p_holm) + ", Holm)";
-  return text + ", n = " + std::to_string(one.n);
-}
-
-std::vector<std::string> sentences_to_quote(const TaskAnalysis& analysis) {
-  std::vector<std::string> sentences;
-  const bool of_renderers = !analysis.renderers.empty();
-  const std::string label = label_of(analysis);
-  for (const TaskGroupComparison& one : analysis.group_models.comparisons) {
-    if (!one.p) continue;
-    sentences.push_back(group_sentence(one) + " (hierarchical model of all answers" +
-                        (label.empty() ? "" : "; " + label) + ").");
-  }
-  for (const TaskComparison& one : of_renderers ? analysis.renderers : analysis.conditions) {
-    if (of_renderers && has_model(analysis, one)) continue;
-    for (const ConditionDifference& difference : one.comparison.differences) {
-      const TTest& test = difference.t_test;
-      const auto ends = ends_in_units(one, test);
-      if (!test.p || !ends) continue;
-      sentences.push_back(
-          measure_plural(one.measure) + " (" +
-          stimulus_of(one.task, one.block_name, of_renderers ? one.shape : one.renderer) + "), " +
-          pair_of(one, difference) + ": " + short_number(in_units(one, difference.mean)) +
-          ", 95 % CI [" + short_number(ends->low) + ", " + short_number(ends->high) + "], " +
-          test_sentence(test, difference.effect_size, difference.n_pairs, one.n_tests) +
-          " (paired t-test" + (one.logarithms ? " of logarithms" : "") +
-          (label.empty() ? "" : "; " + label) + ").");
-    }
-  }
-  return sentences;
-}
-
-namespace {
 
 /// "JNDs", "thresholds": as a word within a sentence.
 std::string measure_word(const std::string& measure) {
@@ -443,23 +364,6 @@ std::string finding_on_means(const TaskAnalysis& analysis) {
   }
   return text;
 }
-
-}  // namespace
-
-std::string conclusion(const TaskAnalysis& analysis) {
-  std::string text;
-  if (analysis.identification) text = conclusion(*analysis.identification) + " ";
-  text += finding_on_renderers(analysis);
-  if (text.empty()) text = finding_on_ratings(analysis);
-  if (text.empty()) text = finding_on_means(analysis);
-  if (text.empty())
-    return "Results of tasks: " + counted(analysis.table.trials.size(), "trial", "trials") +
-           ", none of which gives a mean over participants.";
-  text.pop_back();
-  return text;
-}
-
-namespace {
 
 std::string cell_name(const TaskCell& cell) {
   return stimulus_of(cell.task, cell.block_name, cell.shape) +
@@ -651,24 +555,6 @@ Table steps_table(const TaskCell& cell, const std::string& label) {
   return table;
 }
 
-}  // namespace
-
-std::vector<Table> cell_tables(const TaskCell& cell, const std::string& label) {
-  std::vector<Table> tables{functions_table(cell, label),
-                            detection_table(cell, label),
-                            tracks_table(cell, label),
-                            steps_table(cell, label),
-                            rated_participants_table(cell, label),
-                            rated_levels_table(cell, label),
-                            exponents_table(cell, label),
-                            magnitudes_table(cell, label),
-                            settings_table(cell, label)};
-  std::erase_if(tables, [](const Table& table) { return table.rows.empty(); });
-  return tables;
-}
-
-namespace {
-
 Table information_table(const TaskAnalysis& analysis) {
   Table table;
   table.caption = labelled("Information transfer", label_of(analysis));
@@ -714,6 +600,103 @@ Table confidence_table(const TaskAnalysis& analysis) {
 }
 
 }  // namespace
+
+std::string stimulus_of(const std::string& task, const std::string& block,
+                        const std::string& shape) {
+  std::string name;
+  for (const std::string* part : {&task, &block, &shape}) {
+    if (!part->empty()) name += (name.empty() ? "" : ", ") + printable(*part);
+  }
+  return name;
+}
+
+bool has_model(const TaskAnalysis& analysis, const TaskComparison& one) {
+  return std::ranges::any_of(
+      analysis.group_models.comparisons, [&](const TaskGroupComparison& other) {
+        return other.task == one.task && other.block_name == one.block_name &&
+               other.shape == one.shape && other.measure == one.measure;
+      });
+}
+
+std::vector<Table> group_tables(const TaskAnalysis& analysis) {
+  std::vector<Table> tables{means_table(analysis), model_differences_table(analysis),
+                            detection_model_table(analysis), differences_table(analysis, true),
+                            differences_table(analysis, false)};
+  std::erase_if(tables, [](const Table& table) { return table.rows.empty(); });
+  return tables;
+}
+
+std::string group_sentence(const TaskGroupComparison& one) {
+  const std::string where = stimulus_of(one.task, one.block_name, one.shape);
+  std::string text = measure_plural(one.measure) +
+                     (one.level ? " at " + short_number(*one.level) : "") +
+                     (where.empty() ? "" : " (" + where + ")") + ", " + pair_of(one) + ": ";
+  if (!one.estimate) return text + "undefined, " + one.undefined;
+  text += short_number(*one.estimate);
+  if (one.low && one.high) {
+    text += ", 95 % CI [" + short_number(*one.low) + ", " + short_number(*one.high) + "]";
+  } else {
+    text += ", 95 % CI " + ends_of(one.low, one.high);
+  }
+  text += ", likelihood ratio " + fixed(*one.likelihood_ratio, 2) + ", " + p_phrase(*one.p);
+  if (one.p_holm && *one.p_holm != *one.p) text += " (" + p_phrase(*one.p_holm) + ", Holm)";
+  return text + ", n = " + std::to_string(one.n);
+}
+
+std::vector<std::string> sentences_to_quote(const TaskAnalysis& analysis) {
+  std::vector<std::string> sentences;
+  const bool of_renderers = !analysis.renderers.empty();
+  const std::string label = label_of(analysis);
+  for (const TaskGroupComparison& one : analysis.group_models.comparisons) {
+    if (!one.p) continue;
+    sentences.push_back(group_sentence(one) + " (hierarchical model of all answers" +
+                        (label.empty() ? "" : "; " + label) + ").");
+  }
+  for (const TaskComparison& one : of_renderers ? analysis.renderers : analysis.conditions) {
+    if (of_renderers && has_model(analysis, one)) continue;
+    for (const ConditionDifference& difference : one.comparison.differences) {
+      const TTest& test = difference.t_test;
+      const auto ends = ends_in_units(one, test);
+      if (!test.p || !ends) continue;
+      sentences.push_back(
+          measure_plural(one.measure) + " (" +
+          stimulus_of(one.task, one.block_name, of_renderers ? one.shape : one.renderer) + "), " +
+          pair_of(one, difference) + ": " + short_number(in_units(one, difference.mean)) +
+          ", 95 % CI [" + short_number(ends->low) + ", " + short_number(ends->high) + "], " +
+          test_sentence(test, difference.effect_size, difference.n_pairs, one.n_tests) +
+          " (paired t-test" + (one.logarithms ? " of logarithms" : "") +
+          (label.empty() ? "" : "; " + label) + ").");
+    }
+  }
+  return sentences;
+}
+
+std::string conclusion(const TaskAnalysis& analysis) {
+  std::string text;
+  if (analysis.identification) text = conclusion(*analysis.identification) + " ";
+  text += finding_on_renderers(analysis);
+  if (text.empty()) text = finding_on_ratings(analysis);
+  if (text.empty()) text = finding_on_means(analysis);
+  if (text.empty())
+    return "Results of tasks: " + counted(analysis.table.trials.size(), "trial", "trials") +
+           ", none of which gives a mean over participants.";
+  text.pop_back();
+  return text;
+}
+
+std::vector<Table> cell_tables(const TaskCell& cell, const std::string& label) {
+  std::vector<Table> tables{functions_table(cell, label),
+                            detection_table(cell, label),
+                            tracks_table(cell, label),
+                            steps_table(cell, label),
+                            rated_participants_table(cell, label),
+                            rated_levels_table(cell, label),
+                            exponents_table(cell, label),
+                            magnitudes_table(cell, label),
+                            settings_table(cell, label)};
+  std::erase_if(tables, [](const Table& table) { return table.rows.empty(); });
+  return tables;
+}
 
 std::vector<Table> summary_tables(const TaskAnalysis& analysis) {
   std::vector<Table> tables{information_table(analysis), confidence_table(analysis)};

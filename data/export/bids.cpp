@@ -25,7 +25,7 @@
 namespace palpate::data {
 namespace {
 
-// Internal to data/export: the files beside the samples of a BIDS run written as motion
+// The files beside the samples of a BIDS run written as motion
 // (https://bids-specification.readthedocs.io, "Motion").
 
 /// Name of the tracking system in files: tracksys-stylus.
@@ -230,7 +230,7 @@ nlohmann::ordered_json MotionEvents::description(const ProtocolFacts& facts) {
   return json;
 }
 
-// Internal to data/export: the servo samples of a BIDS run as one physiological recording
+// The servo samples of a BIDS run as one physiological recording
 // (https://bids-specification.readthedocs.io, "Physiological recordings"), or one of motion.
 
 /// A TSV without header, gzipped except for motion (as BIDS requires), one row per servo period

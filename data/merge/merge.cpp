@@ -60,7 +60,7 @@ void require_same_plan(const SweepPlan& plan, const std::string& first, const Sw
   throw StoreRefused(text);
 }
 
-// Internal to data/merge: compares and copies sessions between databases. Row ids differ between
+// Compares and copies sessions between databases. Row ids differ between
 // databases: rows are compared and copied without keys, in an order of their own.
 
 /// The rows of one table that belong to the session with id ?1.

@@ -41,8 +41,6 @@ int value_count(const SweepPlan& plan) {
   return 5 + static_cast<int>(plan.parameters.size() + figure_columns(plan).size());
 }
 
-// Internal to data/store: tables and rows of a sweep's file.
-
 /// The plan and seal needed to read the tables of a file.
 struct SweepTables {
   SweepPlan plan;

@@ -239,7 +239,7 @@ std::string read_movement(const TouchedStimuli& stimuli, const data::StoredTrial
                           analysis::MovementTrial& trial) {
   const data::TrialRecord& record = stored.record;
   const int stimulus = stimuli.stimulus(record.shape);
-  if (const std::string why = unmeasured_task(stimuli.protocol(), record); !why.empty()) return why;
+  if (std::string why = unmeasured_task(stimuli.protocol(), record); !why.empty()) return why;
   if (stimulus < 0) return "the protocol has no such stimulus";
   if (record.samples.empty()) return "no samples";
 

@@ -360,8 +360,9 @@ participants::JudgementSettings PlannedTasks::of_times(const analysis::StudyMode
   const auto shape =
       static_cast<std::size_t>(std::ranges::find(model.shapes, name) - model.shapes.begin());
   // The participant's gains are drawn first; the last trial of the list is this one.
-  constexpr int kMostTrials = 2'000;  // of a session
-  const auto count = static_cast<std::size_t>((trial.session - 1) * kMostTrials + trial.trial);
+  constexpr std::size_t kMostTrials = 2'000;  // of a session
+  const std::size_t count = (static_cast<std::size_t>(trial.session) - 1) * kMostTrials +
+                            static_cast<std::size_t>(trial.trial);
   const std::vector<analysis::ModelTrial> same(count, {shape, conditions_.is_second(trial)});
   const analysis::ModelAnswer drawn =
       analysis::draw_answers(model, made_.typical_time, same, person).back();

@@ -25,7 +25,6 @@ struct Question {
 
 using Kind = Paragraph::Kind;
 using analysis::counted;
-using analysis::joined;
 
 class Questions {
  public:

@@ -28,6 +28,7 @@
 #include "runner/study/study_trials.h"
 
 namespace palpate::runner::commands {
+namespace {
 
 // The part of 'palpate plan' for thresholds.
 
@@ -51,21 +52,8 @@ constexpr MeasureOption kMeasureOptions[] = {
     {"accuracy-effect", analysis::PlannedMeasure::accuracy, &ThresholdOptions::accuracy_points},
     {"rating-effect", analysis::PlannedMeasure::rating, &ThresholdOptions::rating},
     {"exponent-effect", analysis::PlannedMeasure::exponent, &ThresholdOptions::exponent}};
-void add_threshold_options(CommandLine& line, ThresholdOptions& options);
-/// Prints the plan, and writes its JSON. \throws UsageError
-void plan_thresholds_of(const ThresholdOptions& thresholds, const MeasureOption& measure,
-                        const PlanOptions& options,
-                        const boost::program_options::variables_map& values,
-                        output::Outputs& outputs);
-
-/// Prints how often the intervals of thresholds contain the true value, and writes its JSON.
-/// \throws UsageError
-void print_coverage(const PlanOptions& options, const boost::program_options::variables_map& values,
-                    output::Outputs& outputs);
 
 namespace po = boost::program_options;
-
-namespace {
 
 constexpr std::size_t kMostParticipants = 10'000, kMostTrials = 10'000, kMostStudies = 10'000'000;
 constexpr double kMostSd = 100;  // log seconds
@@ -173,6 +161,221 @@ std::string put_default_effects(analysis::StudyModel& model) {
          ". The shapes: " + shapes_of(model) + ".";
 }
 
+/// The times of a pilot, which may be of a protocol with tasks. \throws UsageError
+analysis::TrialTable pilot_trials(const PlanOptions& options) {
+  const auto& [database, csv, protocol] = std::tie(options.database, options.csv, options.protocol);
+  if (!study::is_of_tasks(database, csv, protocol))
+    return study::read_study_trials(database, csv, protocol);
+  const analysis::TaskTable tasks = study::read_study_tasks(database, csv, protocol);
+  if (auto times = analysis::identification_of(tasks)) return std::move(*times);
+  throw UsageError(printable(tasks.source) +
+                   ": expected a pilot in which stimuli are identified; plan --jnd-effect is for "
+                   "thresholds and needs no pilot");
+}
+
+void require(bool right, const char* option, const char* expected) {
+  if (!right) throw UsageError(std::string("--") + option + ": expected " + expected);
+}
+
+/// A percentage as a log ratio, points as a share, others as they are.
+double on_scale(analysis::PlannedMeasure measure, double effect) {
+  switch (measure) {
+    case analysis::PlannedMeasure::jnd:
+    case analysis::PlannedMeasure::threshold:
+    case analysis::PlannedMeasure::exponent:
+      return std::log1p(-effect / 100);
+    case analysis::PlannedMeasure::accuracy:
+      return effect / 100;
+    case analysis::PlannedMeasure::pse:
+    case analysis::PlannedMeasure::rating:
+      break;
+  }
+  return effect;
+}
+
+/// The greatest effect that makes sense: of percentages smaller and larger.
+void require_effect(const MeasureOption& option, double effect, double accuracy) {
+  const auto within = [effect](double low, double high) { return effect >= low && effect <= high; };
+  switch (option.measure) {
+    case analysis::PlannedMeasure::jnd:
+    case analysis::PlannedMeasure::threshold:
+    case analysis::PlannedMeasure::exponent:
+      return require(within(-400, 95), option.name, "percent from -400 to 95");
+    case analysis::PlannedMeasure::accuracy:
+      return require(within(-100 * accuracy + 1, 100 * (1 - accuracy) - 1), option.name,
+                     "percentage points that leave the accuracy between 1 and 99 %");
+    case analysis::PlannedMeasure::pse:
+      return require(within(-5, 5), option.name, "-5 to 5 JNDs");
+    case analysis::PlannedMeasure::rating:
+      return require(within(-6, 6), option.name, "-6 to 6 steps");
+  }
+}
+
+analysis::ThresholdStudy study_of(const ThresholdOptions& thresholds, const MeasureOption& measure,
+                                  const PlanOptions& options, const po::variables_map& values) {
+  const auto within = [](double value, double low, double high) {
+    return value >= low && value <= high;  // false for NaN
+  };
+  require(within(thresholds.accuracy, 0.05, 0.98), "accuracy", "a share from 0.05 to 0.98");
+  const double effect = thresholds.*measure.effect;
+  require_effect(measure, effect, thresholds.accuracy);
+  require(within(thresholds.weber, 0.001, 1), "weber", "a JND / standard from 0.001 to 1");
+  require(within(thresholds.participant_sd, 0, 2), "jnd-sd", "0 to 2");
+  require(within(thresholds.effect_sd, 0, 2), "jnd-effect-sd", "0 to 2");
+  require(within(thresholds.pse_sd, 0, 5), "pse-sd", "0 to 5 JNDs");
+  require(within(thresholds.reach, 0.5, 10), "reach", "0.5 to 10 JNDs");
+  require(within(options.alpha, 1e-6, 0.5), "alpha", "0.000001 to 0.5");
+  require(within(options.power, 0.01, 0.999), "power", "0.01 to 0.999");
+  analysis::ThresholdStudy study;
+  study.weber_fraction = thresholds.weber;
+  study.measure = measure.measure;
+  study.effect = on_scale(measure.measure, effect);
+  study.accuracy = thresholds.accuracy;
+  study.participant_sd = thresholds.participant_sd;
+  study.effect_sd = thresholds.effect_sd;
+  // Between people, odds and ratings differ more than log JNDs.
+  const bool wider = measure.measure == analysis::PlannedMeasure::accuracy ||
+                     measure.measure == analysis::PlannedMeasure::rating;
+  if (wider && values["jnd-sd"].defaulted()) study.participant_sd = 0.7;
+  if (wider && values["jnd-effect-sd"].defaulted()) study.effect_sd = 0.5;
+  if (values.count("equivalence")) {
+    require(thresholds.equivalence > 0 && thresholds.equivalence < 400, "equivalence",
+            "a bound above 0, in the unit of the effect");
+    study.bound = std::abs(on_scale(measure.measure, -thresholds.equivalence));
+  }
+  study.pse_sd = thresholds.pse_sd;
+  study.reach = thresholds.reach;
+  study.alpha = options.alpha;
+  return study;
+}
+
+/// At most so many numbers of participants over the range: each study is fitted for each.
+std::vector<std::size_t> numbers_over(std::size_t least, std::size_t most) {
+  constexpr std::size_t kMost = 5;
+  std::vector<std::size_t> numbers;
+  const std::size_t steps = std::min(kMost - 1, most - least);
+  for (std::size_t i = 0; i <= steps; ++i)
+    numbers.push_back(steps == 0 ? least : least + i * (most - least) / steps);
+  return numbers;
+}
+
+void add_threshold_options(CommandLine& line, ThresholdOptions& options) {
+  auto add = line.options.add_options();
+  add("jnd-effect", po::value(&options.jnd)->value_name("PERCENT"),
+      "of JNDs instead of times: how much smaller the JND is with the second renderer or "
+      "condition; --trials are those of a participant with each, --participants a range");
+  add("pse-effect", po::value(&options.pse)->value_name("JNDS"),
+      "of PSEs: how much higher with the second");
+  add("threshold-effect", po::value(&options.threshold)->value_name("PERCENT"),
+      "of thresholds of a forced choice: how much lower with the second");
+  add("accuracy-effect", po::value(&options.accuracy_points)->value_name("POINTS"),
+      "of accuracy: how many percentage points higher with the second");
+  add("rating-effect", po::value(&options.rating)->value_name("STEPS"),
+      "of mean ratings on seven steps: how much higher with the second");
+  add("exponent-effect", po::value(&options.exponent)->value_name("PERCENT"),
+      "of exponents of magnitude estimation: how much smaller with the second");
+  add("equivalence", po::value(&options.equivalence)->value_name("BOUND"),
+      "show equivalence within this bound instead, in the unit of the effect; with an effect of 0");
+  add("accuracy", po::value(&options.accuracy)->default_value(0.8, "0.8")->value_name("SHARE"),
+      "correct with the first condition");
+  add("weber", po::value(&options.weber)->default_value(0.1, "0.1")->value_name("W"),
+      "JND / standard with the first condition");
+  add("jnd-sd", po::value(&options.participant_sd)->default_value(0.3, "0.3")->value_name("SD"),
+      "of participants' log JND, threshold or exponent; of log odds and ratings 0.7");
+  add("jnd-effect-sd", po::value(&options.effect_sd)->default_value(0.2, "0.2")->value_name("SD"),
+      "of participants' differences: log ratios, JNDs; of log odds and ratings 0.5");
+  add("pse-sd", po::value(&options.pse_sd)->default_value(0.5, "0.5")->value_name("SD"),
+      "of participants' PSE, in JNDs");
+  add("reach", po::value(&options.reach)->default_value(2.5, "2.5")->value_name("JNDS"),
+      "how far the levels reach from the standard");
+  add("coverage",
+      "how often the 95 % intervals of thresholds, slopes and lapses hold the truth, after each "
+      "procedure, with lapses and without, and those of the group's model; takes --studies (200), "
+      "--seed, --jobs, --json");
+}
+
+/// Prints how often the intervals of thresholds contain the true value, and writes its JSON.
+/// \throws UsageError
+void print_coverage(const PlanOptions& options, const po::variables_map& values,
+                    output::Outputs& outputs) {
+  for (const char* other :
+       {"db", "csv", "effect", "gain-sd", "residual-sd", "figure", "reuse", "jnd-effect"}) {
+    if (values.count(other))
+      throw UsageError(std::string("--") + other + ": is of a plan; not with --coverage");
+  }
+  PlanOptions own = options;
+  std::size_t studies = 200;
+  if (values.count("studies")) {
+    const char* const end = own.studies.data() + own.studies.size();
+    const auto [stop, error] = std::from_chars(own.studies.data(), end, studies);
+    require(error == std::errc() && stop == end && studies >= 1 && studies <= 100'000, "studies",
+            "a whole number from 1 to 100000");
+    own.studies = "100";  // the number of plans, which are not made
+  }
+  const analysis::PowerSettings asked = settings_of(own, values).simulation;
+  analysis::CoverageSettings settings;
+  settings.studies = studies;
+  settings.seed = asked.seed;
+  settings.jobs = asked.jobs;
+  output::ProgressLine progress("simulated studies");
+  settings.progress = [&progress](double share) { progress.show(share); };
+  const auto results = analysis::interval_coverage(settings);
+  progress.begin("simulated studies of groups");
+  analysis::GroupCoverageSettings of_groups;
+  of_groups.studies = settings.studies;
+  of_groups.seed = settings.seed;
+  of_groups.jobs = settings.jobs;
+  of_groups.progress = settings.progress;
+  const auto groups = analysis::group_coverage(analysis::group_coverage_studies(), of_groups);
+  progress.clear();
+  if (outputs.wanted("json"))
+    outputs.put("json", analysis::coverage_json(results, settings, groups));
+  outputs.write();
+  std::cout << analysis::coverage_text(results, settings)
+            << analysis::group_coverage_text(groups, of_groups);
+}
+
+/// Prints the plan, and writes its JSON. \throws UsageError
+void plan_thresholds_of(const ThresholdOptions& thresholds, const MeasureOption& measure,
+                        const PlanOptions& options, const po::variables_map& values,
+                        output::Outputs& outputs) {
+  for (const char* other : {"db", "csv", "effect", "gain-sd", "residual-sd", "figure", "reuse"}) {
+    if (values.count(other))
+      throw UsageError(std::string("--") + other + ": is of response times; not with --" +
+                       measure.name);
+  }
+  const analysis::ThresholdStudy study = study_of(thresholds, measure, options, values);
+  analysis::ThresholdPlanSettings settings;
+  PlanOptions own = options;
+  const bool of_ratings = measure.measure == analysis::PlannedMeasure::rating;
+  if (values["trials"].defaulted()) own.trials = of_ratings ? "2,4" : "84,168";
+  if (values["participants"].defaulted()) own.participants = "4-24";
+  const analysis::PlanSettings asked = settings_of(own, values);
+  settings.trials = asked.trials;
+  settings.participants = numbers_over(asked.min_participants, asked.max_participants);
+  settings.jobs = asked.simulation.jobs;
+  constexpr std::size_t kStudies = 200;
+  settings.studies = values.count("studies") ? asked.simulation.studies : kStudies;
+  settings.seed = own.seed;
+  settings.power = own.power;
+  std::sort(settings.trials.begin(), settings.trials.end());
+  output::ProgressLine progress("simulated studies");
+  settings.progress = [&progress](double share) { progress.show(share); };
+  const analysis::ThresholdPlan plan = analysis::plan_thresholds(study, std::move(settings));
+  progress.clear();
+  if (outputs.wanted("json")) outputs.put("json", analysis::threshold_plan_json(plan));
+  outputs.write();
+  std::cout << analysis::threshold_plan_text(plan);
+}
+
+/// \throws protocols::InputError
+void read_known(const std::string& file, const analysis::StudyModel& model,
+                analysis::PlanSettings& settings) {
+  for (analysis::PlanPoint& point :
+       analysis::read_plan_points(protocols::read_text_file(file), file, model, settings))
+    settings.known.push_back(std::move(point));
+}
+
 }  // namespace
 
 void add_plan_options(CommandLine& line, PlanOptions& options) {
@@ -212,18 +415,6 @@ void add_plan_options(CommandLine& line, PlanOptions& options) {
   add("studies", po::value(&options.studies)->value_name("N"),
       "simulated for each power; default 10000, with --test model 1000");
   add("seed", po::value(&options.seed)->default_value(2000)->value_name("S"), "of the simulation");
-}
-
-/// The times of a pilot, which may be of a protocol with tasks. \throws UsageError
-analysis::TrialTable pilot_trials(const PlanOptions& options) {
-  const auto& [database, csv, protocol] = std::tie(options.database, options.csv, options.protocol);
-  if (!study::is_of_tasks(database, csv, protocol))
-    return study::read_study_trials(database, csv, protocol);
-  const analysis::TaskTable tasks = study::read_study_tasks(database, csv, protocol);
-  if (auto times = analysis::identification_of(tasks)) return std::move(*times);
-  throw UsageError(printable(tasks.source) +
-                   ": expected a pilot in which stimuli are identified; plan --jnd-effect is for "
-                   "thresholds and needs no pilot");
 }
 
 analysis::Pilot starting_point(const PlanOptions& options, const po::variables_map& values) {
@@ -327,218 +518,6 @@ analysis::PlanSettings settings_of(const PlanOptions& options, const po::variabl
   if (values.count("jobs") != 0) simulation.jobs = whole_number("jobs", options.jobs, 1, 256);
   return out;
 }
-
-namespace po = boost::program_options;
-
-namespace {
-
-void require(bool right, const char* option, const char* expected) {
-  if (!right) throw UsageError(std::string("--") + option + ": expected " + expected);
-}
-
-/// A percentage as a log ratio, points as a share, others as they are.
-double on_scale(analysis::PlannedMeasure measure, double effect) {
-  switch (measure) {
-    case analysis::PlannedMeasure::jnd:
-    case analysis::PlannedMeasure::threshold:
-    case analysis::PlannedMeasure::exponent:
-      return std::log1p(-effect / 100);
-    case analysis::PlannedMeasure::accuracy:
-      return effect / 100;
-    case analysis::PlannedMeasure::pse:
-    case analysis::PlannedMeasure::rating:
-      break;
-  }
-  return effect;
-}
-
-/// The greatest effect that makes sense: of percentages smaller and larger.
-void require_effect(const MeasureOption& option, double effect, double accuracy) {
-  const auto within = [effect](double low, double high) { return effect >= low && effect <= high; };
-  switch (option.measure) {
-    case analysis::PlannedMeasure::jnd:
-    case analysis::PlannedMeasure::threshold:
-    case analysis::PlannedMeasure::exponent:
-      return require(within(-400, 95), option.name, "percent from -400 to 95");
-    case analysis::PlannedMeasure::accuracy:
-      return require(within(-100 * accuracy + 1, 100 * (1 - accuracy) - 1), option.name,
-                     "percentage points that leave the accuracy between 1 and 99 %");
-    case analysis::PlannedMeasure::pse:
-      return require(within(-5, 5), option.name, "-5 to 5 JNDs");
-    case analysis::PlannedMeasure::rating:
-      return require(within(-6, 6), option.name, "-6 to 6 steps");
-  }
-}
-
-analysis::ThresholdStudy study_of(const ThresholdOptions& thresholds, const MeasureOption& measure,
-                                  const PlanOptions& options, const po::variables_map& values) {
-  const auto within = [](double value, double low, double high) {
-    return value >= low && value <= high;  // false for NaN
-  };
-  require(within(thresholds.accuracy, 0.05, 0.98), "accuracy", "a share from 0.05 to 0.98");
-  const double effect = thresholds.*measure.effect;
-  require_effect(measure, effect, thresholds.accuracy);
-  require(within(thresholds.weber, 0.001, 1), "weber", "a JND / standard from 0.001 to 1");
-  require(within(thresholds.participant_sd, 0, 2), "jnd-sd", "0 to 2");
-  require(within(thresholds.effect_sd, 0, 2), "jnd-effect-sd", "0 to 2");
-  require(within(thresholds.pse_sd, 0, 5), "pse-sd", "0 to 5 JNDs");
-  require(within(thresholds.reach, 0.5, 10), "reach", "0.5 to 10 JNDs");
-  require(within(options.alpha, 1e-6, 0.5), "alpha", "0.000001 to 0.5");
-  require(within(options.power, 0.01, 0.999), "power", "0.01 to 0.999");
-  analysis::ThresholdStudy study;
-  study.weber_fraction = thresholds.weber;
-  study.measure = measure.measure;
-  study.effect = on_scale(measure.measure, effect);
-  study.accuracy = thresholds.accuracy;
-  study.participant_sd = thresholds.participant_sd;
-  study.effect_sd = thresholds.effect_sd;
-  // Between people, odds and ratings differ more than log JNDs.
-  const bool wider = measure.measure == analysis::PlannedMeasure::accuracy ||
-                     measure.measure == analysis::PlannedMeasure::rating;
-  if (wider && values["jnd-sd"].defaulted()) study.participant_sd = 0.7;
-  if (wider && values["jnd-effect-sd"].defaulted()) study.effect_sd = 0.5;
-  if (values.count("equivalence")) {
-    require(thresholds.equivalence > 0 && thresholds.equivalence < 400, "equivalence",
-            "a bound above 0, in the unit of the effect");
-    study.bound = std::abs(on_scale(measure.measure, -thresholds.equivalence));
-  }
-  study.pse_sd = thresholds.pse_sd;
-  study.reach = thresholds.reach;
-  study.alpha = options.alpha;
-  return study;
-}
-
-/// At most so many numbers of participants over the range: each study is fitted for each.
-std::vector<std::size_t> numbers_over(std::size_t least, std::size_t most) {
-  constexpr std::size_t kMost = 5;
-  std::vector<std::size_t> numbers;
-  const std::size_t steps = std::min(kMost - 1, most - least);
-  for (std::size_t i = 0; i <= steps; ++i)
-    numbers.push_back(steps == 0 ? least : least + i * (most - least) / steps);
-  return numbers;
-}
-
-}  // namespace
-
-void add_threshold_options(CommandLine& line, ThresholdOptions& options) {
-  auto add = line.options.add_options();
-  add("jnd-effect", po::value(&options.jnd)->value_name("PERCENT"),
-      "of JNDs instead of times: how much smaller the JND is with the second renderer or "
-      "condition; --trials are those of a participant with each, --participants a range");
-  add("pse-effect", po::value(&options.pse)->value_name("JNDS"),
-      "of PSEs: how much higher with the second");
-  add("threshold-effect", po::value(&options.threshold)->value_name("PERCENT"),
-      "of thresholds of a forced choice: how much lower with the second");
-  add("accuracy-effect", po::value(&options.accuracy_points)->value_name("POINTS"),
-      "of accuracy: how many percentage points higher with the second");
-  add("rating-effect", po::value(&options.rating)->value_name("STEPS"),
-      "of mean ratings on seven steps: how much higher with the second");
-  add("exponent-effect", po::value(&options.exponent)->value_name("PERCENT"),
-      "of exponents of magnitude estimation: how much smaller with the second");
-  add("equivalence", po::value(&options.equivalence)->value_name("BOUND"),
-      "show equivalence within this bound instead, in the unit of the effect; with an effect of 0");
-  add("accuracy", po::value(&options.accuracy)->default_value(0.8, "0.8")->value_name("SHARE"),
-      "correct with the first condition");
-  add("weber", po::value(&options.weber)->default_value(0.1, "0.1")->value_name("W"),
-      "JND / standard with the first condition");
-  add("jnd-sd", po::value(&options.participant_sd)->default_value(0.3, "0.3")->value_name("SD"),
-      "of participants' log JND, threshold or exponent; of log odds and ratings 0.7");
-  add("jnd-effect-sd", po::value(&options.effect_sd)->default_value(0.2, "0.2")->value_name("SD"),
-      "of participants' differences: log ratios, JNDs; of log odds and ratings 0.5");
-  add("pse-sd", po::value(&options.pse_sd)->default_value(0.5, "0.5")->value_name("SD"),
-      "of participants' PSE, in JNDs");
-  add("reach", po::value(&options.reach)->default_value(2.5, "2.5")->value_name("JNDS"),
-      "how far the levels reach from the standard");
-  add("coverage",
-      "how often the 95 % intervals of thresholds, slopes and lapses hold the truth, after each "
-      "procedure, with lapses and without, and those of the group's model; takes --studies (200), "
-      "--seed, --jobs, --json");
-}
-
-void print_coverage(const PlanOptions& options, const po::variables_map& values,
-                    output::Outputs& outputs) {
-  for (const char* other :
-       {"db", "csv", "effect", "gain-sd", "residual-sd", "figure", "reuse", "jnd-effect"}) {
-    if (values.count(other))
-      throw UsageError(std::string("--") + other + ": is of a plan; not with --coverage");
-  }
-  PlanOptions own = options;
-  std::size_t studies = 200;
-  if (values.count("studies")) {
-    const char* const end = own.studies.data() + own.studies.size();
-    const auto [stop, error] = std::from_chars(own.studies.data(), end, studies);
-    require(error == std::errc() && stop == end && studies >= 1 && studies <= 100'000, "studies",
-            "a whole number from 1 to 100000");
-    own.studies = "100";  // the number of plans, which are not made
-  }
-  const analysis::PowerSettings asked = settings_of(own, values).simulation;
-  analysis::CoverageSettings settings;
-  settings.studies = studies;
-  settings.seed = asked.seed;
-  settings.jobs = asked.jobs;
-  output::ProgressLine progress("simulated studies");
-  settings.progress = [&progress](double share) { progress.show(share); };
-  const auto results = analysis::interval_coverage(settings);
-  progress.begin("simulated studies of groups");
-  analysis::GroupCoverageSettings of_groups;
-  of_groups.studies = settings.studies;
-  of_groups.seed = settings.seed;
-  of_groups.jobs = settings.jobs;
-  of_groups.progress = settings.progress;
-  const auto groups = analysis::group_coverage(analysis::group_coverage_studies(), of_groups);
-  progress.clear();
-  if (outputs.wanted("json"))
-    outputs.put("json", analysis::coverage_json(results, settings, groups));
-  outputs.write();
-  std::cout << analysis::coverage_text(results, settings)
-            << analysis::group_coverage_text(groups, of_groups);
-}
-
-void plan_thresholds_of(const ThresholdOptions& thresholds, const MeasureOption& measure,
-                        const PlanOptions& options, const po::variables_map& values,
-                        output::Outputs& outputs) {
-  for (const char* other : {"db", "csv", "effect", "gain-sd", "residual-sd", "figure", "reuse"}) {
-    if (values.count(other))
-      throw UsageError(std::string("--") + other + ": is of response times; not with --" +
-                       measure.name);
-  }
-  const analysis::ThresholdStudy study = study_of(thresholds, measure, options, values);
-  analysis::ThresholdPlanSettings settings;
-  PlanOptions own = options;
-  const bool of_ratings = measure.measure == analysis::PlannedMeasure::rating;
-  if (values["trials"].defaulted()) own.trials = of_ratings ? "2,4" : "84,168";
-  if (values["participants"].defaulted()) own.participants = "4-24";
-  const analysis::PlanSettings asked = settings_of(own, values);
-  settings.trials = asked.trials;
-  settings.participants = numbers_over(asked.min_participants, asked.max_participants);
-  settings.jobs = asked.simulation.jobs;
-  constexpr std::size_t kStudies = 200;
-  settings.studies = values.count("studies") ? asked.simulation.studies : kStudies;
-  settings.seed = own.seed;
-  settings.power = own.power;
-  std::sort(settings.trials.begin(), settings.trials.end());
-  output::ProgressLine progress("simulated studies");
-  settings.progress = [&progress](double share) { progress.show(share); };
-  const analysis::ThresholdPlan plan = analysis::plan_thresholds(study, std::move(settings));
-  progress.clear();
-  if (outputs.wanted("json")) outputs.put("json", analysis::threshold_plan_json(plan));
-  outputs.write();
-  std::cout << analysis::threshold_plan_text(plan);
-}
-
-namespace po = boost::program_options;
-
-namespace {
-
-/// \throws protocols::InputError
-void read_known(const std::string& file, const analysis::StudyModel& model,
-                analysis::PlanSettings& settings) {
-  for (analysis::PlanPoint& point :
-       analysis::read_plan_points(protocols::read_text_file(file), file, model, settings))
-    settings.known.push_back(std::move(point));
-}
-
-}  // namespace
 
 int plan_command(const std::vector<std::string>& args) {
   CommandLine line;
