@@ -260,6 +260,7 @@ def scene_lines():
                   f"explore corner.stl {path} --animation corner.webp --every 2s --size 160x90 --force", timed=True),
            refused("explore corner.stl --device simulated --calibration none.json --without-calibration --pictures kept", 1),
            refused("explore corner.stl --device touch --library none.so --serial A", 1),
+           refused("explore corner.stl --device simulated --markers serial:none --marker-codes --sync --stream lsl", 1),
            refused("explore corner.stl --device inverse3 --service 127.0.0.1:9 --firmware none", 1)]
 
 

@@ -119,10 +119,12 @@ def serve_lines():
                   ("start", {"stimulus": "box", "level": 25, "renderer": "point", "trial": 3, "orientation_wxyz": [0.6, 0, 0.8, 0]}),
                   ("answer", {"response": "hard"})]),
            *after_session("served")]
-    yield [refused("serve --device simulated --scene none.json"), refused("serve --device falcon --serial 5 --firmware none", 1),
+    yield [refused("serve --device simulated --scene none.json"), refused("serve --device falcon --serial 5 --firmware none"),
            refused("serve --device touch --library none.so", 1), refused("serve --device inverse3 --service 127.0.0.1:9", 1),
            refused("serve --device falcon2 --serial A"),
-           refused("serve --device simulated --protocol none.json")]
+           refused("serve --device simulated --protocol none.json"),
+           refused("serve --device simulated --protocol protocols/quick.json --db marked.db --participant A --new-participant"
+                   " --markers serial:none --marker-codes --sync --stream lsl --sound-device none --without-noise", 1)]
 
 
 def device_lines():

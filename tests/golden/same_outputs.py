@@ -30,7 +30,7 @@ DATED = r"(registration\.(json|md)|osf\.json|form\.json|check\.(json|html)|repor
 HIDDEN = (
     (r"\d{4}-\d\d-\d\d(T\d\d:\d\d(:\d\d(\.\d+)?)?Z?| \d\d:\d\d UTC)?|today \d\d:\d\d|at \d\d:\d\d:\d\d UTC", "DATE"),
     (rf'[0-9a-f]{{64}}(?=  (\S*/)?{DATED}\n)', "SUM"),
-    (r"([Dd]igest[^\n]{0,60}?)[0-9a-f]{64}|[0-9a-f]{64}(?=; compare it with the one)", r"\1DIGEST"),
+    (r"([Dd]igest[^\n]{0,60}?|the given one: | found )[0-9a-f]{64}|[0-9a-f]{64}(?=; compare it with the one)", r"\1DIGEST"),
     (rf'("name": "(\S*/)?{DATED}"[^{{}}]*"sha256": ")[0-9a-f]{{64}}', r"\1SUM"),
     (r"[\d.]+ simulated s in [\d.]+ s, [\d.]+ simulated seconds per second", "PACE"),
     (r"\b[\d.]+(e[-+]?\d+)? (us|ms|s|min|simulated seconds per second)\b", "TIME"),
