@@ -257,8 +257,8 @@ void read_session_settings(ObjectReader& reader, Protocol& protocol) {
       "response",
       [&](ObjectReader& section) {
         read_response_keys(section, protocol);
-        section.number("time_out_s", protocol.response.time_out, {0, 3600, "s", true});
-        section.boolean("feedback", protocol.response.feedback);
+        section.number("time_out_s", protocol.blocks.front().time_out, {0, 3600, "s", true});
+        section.boolean("feedback", protocol.blocks.front().feedback);
       },
       Presence::required);
   read_texts(reader, protocol);
@@ -277,6 +277,7 @@ void read_renderer_order(ObjectReader& reader, Protocol& protocol) {
 /// What version 1 says of the one task that it has.
 void read_identification(ObjectReader& reader, Protocol& protocol) {
   reader.integer("repetitions", protocol.repetitions, kRepetitions, Presence::required);
+  protocol.blocks = {shapes_block(protocol)};
   reader.section("order", [&](ObjectReader& section) {
     section.choice("kind", protocol.order.kind,
                    {{"random", OrderKind::random}, {"sequential", OrderKind::sequential}});

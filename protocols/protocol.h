@@ -65,10 +65,18 @@ struct ConfidenceSpec {
 struct PracticeCriterion {
   int correct = 1, of = 1;
   int most_trials = 1;
+  bool by_round = false;  ///< judged at the end of a round only
+};
+
+/// What determines the order of a block's trials, and how they are announced.
+enum class BlockOrder {
+  own,    ///< the block alone; a question is shown, intervals are told
+  shapes  ///< the study of shapes: schedule.h, through all sessions; nothing but its keys is shown
 };
 
 struct TaskBlock {
-  std::string name;  ///< unique within the protocol
+  std::string name;  ///< unique within the protocol; "": of the study of shapes
+  BlockOrder order = BlockOrder::own;
   TaskKind task = TaskKind::identify;
   int session = 1;
   bool practice = false;  ///< not analysed
@@ -104,6 +112,7 @@ struct TaskBlock {
   double time_out = 60;  ///< s, for the answer, from the begin of the last interval
   /// practice: its trials come again in rounds; none: once
   std::optional<PracticeCriterion> criterion;
+  bool practice_feedback = false;  ///< whatever `feedback` says
 };
 
 /// A text to read or questions to answer, before the first block, between blocks or after the last.
@@ -245,8 +254,6 @@ struct Protocol {
   struct Response {
     std::map<std::string, std::string> keys;    ///< key -> stimulus name
     std::map<std::string, std::string> labels;  ///< stimulus name -> what is read instead of it
-    double time_out = 60;                       ///< s
-    bool feedback = false;
   } response;
   struct Stylus {
     double length = 0.12;  ///< m
@@ -295,8 +302,8 @@ struct Protocol {
   bool samples = false;
   std::uint64_t seed = 0;
 
+  std::vector<TaskBlock> blocks;  ///< version 1: the study of shapes alone
   // Version 2; empty in version 1.
-  std::vector<TaskBlock> blocks;
   bool blocks_counterbalanced = false;  ///< within a session; practice stays before its block
   std::vector<PageSpec> pages;
   std::vector<std::string> stimulus_texts;  ///< JSON of each stimulus, for its levels

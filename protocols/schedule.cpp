@@ -248,18 +248,23 @@ long long main_trials(const Protocol& protocol) {
          static_cast<long long>(protocol.stimuli.size()) * protocol.repetitions;
 }
 
-const TaskBlock* block_of(const Protocol& protocol, const Trial& trial) {
-  if (trial.task_block < 0) return nullptr;
-  return &protocol.blocks[static_cast<std::size_t>(trial.task_block)];
+TaskBlock shapes_block(const Protocol& protocol) {
+  TaskBlock block;
+  block.order = BlockOrder::shapes;
+  block.renderers = protocol.renderers;
+  block.repetitions = protocol.repetitions;
+  block.practice_feedback = true;
+  for (const StimulusSpec& stimulus : protocol.stimuli) {
+    block.stimuli.push_back(static_cast<int>(block.stimuli.size()));
+    block.answers.push_back({"", stimulus.name, ""});
+  }
+  return block;
 }
 
-TaskBlock identification_block(const Protocol& protocol) {
-  TaskBlock block;
-  block.time_out = protocol.response.time_out;
-  block.feedback = protocol.response.feedback;
-  for (const StimulusSpec& stimulus : protocol.stimuli)
-    block.answers.push_back({"", stimulus.name, ""});
-  return block;
+std::optional<int> study_of_shapes(const Protocol& protocol) {
+  const auto found = std::ranges::find(protocol.blocks, BlockOrder::shapes, &TaskBlock::order);
+  if (found == protocol.blocks.end()) return std::nullopt;
+  return static_cast<int>(found - protocol.blocks.begin());
 }
 
 std::vector<Trial> practice_round(const Protocol& protocol, int participant_number,
@@ -275,8 +280,6 @@ std::vector<Trial> practice_round(const Protocol& protocol, int participant_numb
 
 std::vector<Trial> schedule(const Protocol& protocol, int participant_number) {
   if (participant_number < 1) throw std::invalid_argument("participants are numbered from 1");
-  if (protocol.version == 2)
-    throw std::invalid_argument("answers choose the trials of a protocol of version 2");
   const std::vector<Group> groups = groups_in_order(protocol, participant_number);
   std::vector<Trial> trials;
   int session = 0, block = 0, trial = 0, practised = 0;

@@ -11,6 +11,7 @@
 // The limits max_run and min_distance hold within each block and each round of practice, not across
 // their borders, where there are breaks or instructions.
 
+#include <cstddef>
 #include <optional>
 #include <stdexcept>
 #include <vector>
@@ -35,27 +36,31 @@ struct Trial {
   Quat orientation{1, 0, 0, 0};
   bool practice = false;  ///< practice or warm-up: excluded from analysis
   // Stimulus and renderer are those of the judged interval.
-  int task_block = -1;                         ///< index into Protocol::blocks; -1: version 1
+  int task_block = 0;                          ///< index into Protocol::blocks
   int track = 1;                               ///< 1, 2, ...: stimulus, renderer and procedure
   std::optional<double> level = std::nullopt;  ///< adjust: the starting level
   bool catch_trial = false;
   std::vector<Interval> intervals = {};  ///< in order of presentation
 };
 
-/// The block of tasks of a trial; nullptr: the protocol has none (version 1).
-const TaskBlock* block_of(const Protocol& protocol, const Trial& trial);
+/// The block of a trial.
+inline const TaskBlock& block_of(const Protocol& protocol, const Trial& trial) {
+  return protocol.blocks[static_cast<std::size_t>(trial.task_block)];
+}
 
-/// What each trial of a protocol of version 1 asks: to identify one of all stimuli, in their order.
-TaskBlock identification_block(const Protocol& protocol);
+/// The study of shapes that a protocol of version 1 describes, as its only block: to identify one
+/// of all stimuli, in their order.
+TaskBlock shapes_block(const Protocol& protocol);
+/// The index of that block; none: the blocks have orders of their own.
+std::optional<int> study_of_shapes(const Protocol& protocol);
 
 /// The limits on the order of trials cannot be satisfied; what() says why and what can be changed.
 class ScheduleError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Version 1: the trials of participant number 1, 2, ... in order. Depends on the protocol's seed
-/// and the number alone; in version 2 answers count, too (tasks/task_plan.h). Practice appears
-/// once, as its first round.
+/// The study of shapes: the trials of participant number 1, 2, ... in order. Depends on the
+/// protocol's seed and the number alone. Practice appears once, as its first round.
 /// \throws ScheduleError if the constraints have no solution, std::invalid_argument for a
 /// participant number below 1.
 std::vector<Trial> schedule(const Protocol& protocol, int participant_number);

@@ -106,8 +106,8 @@ PUBLIC = {
     "runner/evidence/verification": "explain extreme_cases random_solids reference search union_cases",
     "runner/evidence/accuracy": "body_study paper_first_contact peers study union_study",
     "rendering/bodies/soft": "soft_scene",
-    "protocols": "answer_keys difference json_document parse protocol schedule sweep_space "
-                 "tasks/task_plan tasks/levels tasks/texts",
+    "protocols": "answer_keys difference json_document parse protocol schedule session_plan sweep_space "
+                 "tasks/block_order tasks/block_procedures tasks/levels tasks/texts",
     "protocols/procedures": "procedure procedure_spec psychometric",
     "data/base": "checksum input_file json_text markdown random text",
     "data": "column_table record stored_protocol sweep_record",
@@ -117,13 +117,13 @@ PUBLIC = {
     "data/export": "csv datasets sample_slots settings study_about delimited_row",
     "data/merge": "merge",
     "analysis": "text",
-    "analysis/input": "csv_reader trials study_record sweep_table task_trials",
+    "analysis/input": "csv_reader trials study_record study_table sweep_table",
     "analysis/statistics": "analysis comparison conclusions describe group_simulation interval_coverage jobs mixed_model "
                            "paired paired_evidence pattern power plan quantiles sensitivity "
                            "sweep_analysis task_analysis threshold_plan",
     "analysis/movement": "comparison measures pictures",
     "analysis/figures": "panel_drawing figures svg",
-    "analysis/report": "coverage_report html_page hypotheses plan_record plan_report report tables",
+    "analysis/report": "coverage_report html_page hypotheses plan_record plan_report report study_report tables",
     "runner": "",
     "runner/servo": "device force_limiter passivity realtime ring sample servo servo_thread "
                     "shared_value tick_source touched_places triple_buffer",
@@ -136,7 +136,7 @@ PUBLIC = {
                             "scene_renderer",
     "runner/participants": "keyboard respondent simulated_settings simulated "
                            "task_participant",
-    "runner/session": "device_check live_forces session_plan live_session markers sample_stream signals "
+    "runner/session": "device_check live_forces live_session markers recorded_outcome sample_stream session_scenes signals "
                       "preflight run_record replay session session_end simulated_study "
                       "socket_advisor station",
     "runner/output": "outputs progress_line",
@@ -144,7 +144,7 @@ PUBLIC = {
     "runner/movement": "touched_trial",
     "runner/evidence/reports": "accuracy_report",
     "runner/registration": "about_file answers bundle_contents deviations planned_conditions planned_studies registration registration_text sealed_folder",
-    "runner/study": "export_settings simulation_limits study_analysis study_order study_trials task_words",
+    "runner/study": "export_settings simulation_limits study_order study_trials task_words",
     "runner/serve": "network served_scene served_session",
     "runner/sweep": "cluster_job swept_study",
     "runner/evidence/stability": "boundary",

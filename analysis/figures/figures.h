@@ -15,7 +15,7 @@ namespace palpate::analysis {
 struct MovementPictures;
 struct MovementTable;
 struct SweepAnalysis;
-struct TaskAnalysis;
+struct StudyAnalysis;
 
 /// What a colour encodes; each palette gives it a value. point, ray, third to eighth: a renderer or
 /// a separate line; paper: results of Ho, Basdogan & Srinivasan (2000); heat: cells of a matrix;
@@ -142,7 +142,7 @@ constexpr std::size_t kShownParticipants = 200;
 /// successes at each level (area of the symbol: trials), the fitted function and the threshold's
 /// interval; and "track1", ...: levels over the trials of up to four tracks with the answers, and
 /// reversals of a staircase. Participants beyond the first 12 are left out, with a note.
-std::vector<Figure> task_figures(const TaskAnalysis& analysis);
+std::vector<Figure> task_figures(const StudyAnalysis& analysis);
 
 // Figures of movement.
 

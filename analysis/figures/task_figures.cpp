@@ -237,7 +237,7 @@ std::string difference_sentence(const TaskGroupComparison& one) {
          counted(one.n, "participant", "participants") + "). ";
 }
 
-void add_group_figures(const TaskAnalysis& analysis, std::vector<Figure>& figures) {
+void add_group_figures(const StudyAnalysis& analysis, std::vector<Figure>& figures) {
   const auto same = [](const auto& a, const auto& b) {
     return a.task == b.task && a.block_name == b.block_name && a.shape == b.shape;
   };
@@ -292,7 +292,7 @@ void add_group_figures(const TaskAnalysis& analysis, std::vector<Figure>& figure
 }
 
 /// A figure of cells: titled by what they have in common.
-Figure new_task_figure(const TaskAnalysis& analysis, std::string id, const std::string& title,
+Figure new_task_figure(const StudyAnalysis& analysis, std::string id, const std::string& title,
                        const TaskCell& cell, const std::string& shape) {
   Figure figure;
   figure.id = std::move(id);
@@ -319,7 +319,7 @@ using CellList = std::vector<const TaskCell*>;
 
 /// Cells with something to draw that agree in `key`, in order of their first.
 template <class Key, class KeyOf>
-std::vector<CellList> grouped_cells(const TaskAnalysis& analysis, bool (*has)(const TaskCell&),
+std::vector<CellList> grouped_cells(const StudyAnalysis& analysis, bool (*has)(const TaskCell&),
                                     KeyOf key_of) {
   std::vector<CellList> groups;
   std::map<Key, std::size_t> places;
@@ -497,7 +497,7 @@ Panel shares_panel(const CellList& cells, const std::string& renderer) {
   return panel;
 }
 
-void add_rating_figures(const TaskAnalysis& analysis, std::vector<Figure>& figures) {
+void add_rating_figures(const StudyAnalysis& analysis, std::vector<Figure>& figures) {
   const auto has = [](const TaskCell& cell) {
     return cell.ratings && cell.ratings->spread.ratings > 0;
   };
@@ -621,7 +621,7 @@ Panel magnitude_panel(const TaskCell& cell, std::size_t renderer) {
   return panel;
 }
 
-void add_magnitude_figures(const TaskAnalysis& analysis, std::vector<Figure>& figures) {
+void add_magnitude_figures(const StudyAnalysis& analysis, std::vector<Figure>& figures) {
   const auto has = [](const TaskCell& cell) {
     return cell.magnitude && !cell.magnitude->means.empty();
   };
@@ -647,7 +647,7 @@ void add_magnitude_figures(const TaskAnalysis& analysis, std::vector<Figure>& fi
   }
 }
 
-Figure figure_of(const TaskAnalysis& analysis, const TaskCell& cell, std::string id,
+Figure figure_of(const StudyAnalysis& analysis, const TaskCell& cell, std::string id,
                  const std::string& what) {
   Figure figure = new_task_figure(analysis, std::move(id), what, cell, cell.shape);
   if (!cell.renderer.empty()) figure.title += ", " + printable(cell.renderer);
@@ -660,7 +660,7 @@ Figure figure_of(const TaskAnalysis& analysis, const TaskCell& cell, std::string
 
 }  // namespace
 
-std::vector<Figure> task_figures(const TaskAnalysis& analysis) {
+std::vector<Figure> task_figures(const StudyAnalysis& analysis) {
   std::vector<Figure> figures;
   add_group_figures(analysis, figures);
   add_rating_figures(analysis, figures);

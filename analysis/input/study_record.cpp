@@ -67,8 +67,7 @@ void add_trial(const ServoTrial& trial, std::vector<ServoQuality>& all) {
       std::clamp(bin + 1e-9, 0.0, ServoQuality::kBins - 1.0))];
 }
 
-StudyRecord read_study_record(const std::string& database, const std::string& protocol) {
-  data::Store store = data::Store::open(database, data::Store::Mode::read_only);
+StudyRecord read_study_record(data::Store& store, const std::string& protocol) {
   StudyRecord record;
   std::set<std::string, std::less<>> wanted;  // checksums
   for (const data::ProtocolInfo& one : store.protocols()) {

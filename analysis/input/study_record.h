@@ -12,6 +12,10 @@
 #include <string_view>
 #include <vector>
 
+namespace palpate::data {
+class Store;
+}
+
 namespace palpate::analysis {
 
 // Number of trials in which the renderer's torque was left out, because the device drives force
@@ -76,8 +80,7 @@ struct ServoTrial {
 /// Adds a trial to the servo quality of its renderer; the list stays sorted.
 void add_trial(const ServoTrial& trial, std::vector<ServoQuality>& servo);
 
-/// \param database path \param protocol  the one that is wanted (is_protocol)
-/// \throws as data::Store::open
-StudyRecord read_study_record(const std::string& database, const std::string& protocol = "");
+/// \param protocol  the one that is wanted (is_protocol)
+StudyRecord read_study_record(data::Store& store, const std::string& protocol = "");
 
 }  // namespace palpate::analysis

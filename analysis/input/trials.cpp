@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <optional>
@@ -26,6 +27,8 @@
 namespace palpate::analysis {
 namespace {
 
+/// Response time of a time-out with an unknown limit.
+constexpr double kNoTime = std::numeric_limits<double>::quiet_NaN();
 constexpr std::array<std::string_view, 4> kShapes{"sphere", "cone", "cylinder", "cube"};
 
 /// Rank of a shape among the levels: those of Ho, Basdogan & Srinivasan (2000) first, then in the
@@ -264,7 +267,7 @@ class CsvTrials {
     };
     if (!wanted_.empty() && std::ranges::none_of(wanted_, is_shown)) return;
     ok_ = true;
-    RawTrial raw;
+    StudyTrial& raw = row_;
     raw.participant = name(participant_id, names_);
     raw.session = number(session);
     raw.block = number(block);
@@ -272,6 +275,7 @@ class CsvTrials {
     raw.renderer = name(renderer, renderers_);
     raw.shape = name(shape, stimuli_);
     const std::string_view answer = field(response);
+    raw.response.clear();
     if (!is_missing(answer) || answer == field(shape) || stimuli_.contains(answer))
       raw.response = name(response, stimuli_);
     else if (!answer.empty())
@@ -279,8 +283,9 @@ class CsvTrials {
     raw.timed_out = at_[timed_out] == kAbsent ? raw.response.empty() : truth(timed_out);
     // Time and correctness of a time-out may be missing.
     raw.correct = !(raw.timed_out && is_missing(field(correct))) && truth(correct);
-    raw.response_time =
-        raw.timed_out && is_missing(field(response_time)) ? kNoTime : time(response_time);
+    raw.response_time.reset();
+    if (!raw.timed_out || !is_missing(field(response_time)))
+      raw.response_time = time(response_time);
     raw.practice = truth(practice);
     raw.simulated = truth(simulated);
     std::optional<bool> driven;
@@ -293,7 +298,7 @@ class CsvTrials {
     stimuli_.number(raw.shape);
     if (!raw.response.empty()) stimuli_.number(raw.response);
     if (!within_limits()) return;
-    if (at_[protocol_sha256] != kAbsent) raw.protocol = field(protocol_sha256);
+    if (at_[protocol_sha256] != kAbsent) raw.protocol_sha256 = field(protocol_sha256);
     if (at_[protocol_sha256] != kAbsent) note_shown(field(protocol_sha256), protocols_);
     if (at_[program_version] != kAbsent) note_shown(field(program_version), versions_);
     if (faults_.count() == 0) builder_.add(raw);
@@ -344,6 +349,7 @@ class CsvTrials {
   Faults faults_;
   const CsvReader* reader_ = nullptr;
   const std::vector<std::string_view>* fields_ = nullptr;
+  StudyTrial row_;  ///< under way: its texts keep their memory
   std::array<std::size_t, n_columns> at_{};
   std::size_t n_fields_ = 0, n_rows_ = 0;
   bool ok_ = true, too_many_ = false;
@@ -434,29 +440,32 @@ std::uint32_t Interner::number(std::string_view name) {
   return last_;
 }
 
-void TrialTableBuilder::add(const RawTrial& raw) {
-  if (raw.practice) {
+void TrialTableBuilder::add(const StudyTrial& trial) {
+  if (trial.practice) {
     ++n_practice_;
     return;
   }
+  const bool correct = trial.correct.value_or(false);
   TrialRow row;
-  row.participant = participants_.number(raw.participant);
-  row.renderer = static_cast<std::uint16_t>(renderers_.number(raw.renderer));
-  row.shape = static_cast<std::uint16_t>(stimuli_.number(raw.shape));
-  if (!raw.response.empty()) row.answer = static_cast<std::int32_t>(stimuli_.number(raw.response));
-  row.timed_out = raw.timed_out;
-  row.correct = raw.correct && !raw.timed_out;
-  row.response_time = raw.response_time;
+  row.participant = participants_.number(trial.participant);
+  row.renderer = static_cast<std::uint16_t>(renderers_.number(trial.renderer));
+  row.shape = static_cast<std::uint16_t>(stimuli_.number(trial.shape));
+  if (!trial.response.empty())
+    row.answer = static_cast<std::int32_t>(stimuli_.number(trial.response));
+  row.timed_out = trial.timed_out;
+  row.correct = correct && !trial.timed_out;
+  row.response_time = trial.response_time.value_or(kNoTime);
   shown_.resize(stimuli_.names().size());
   if (shown_[row.shape] == 0) shown_[row.shape] = ++n_shown_;
-  n_simulated_ += raw.simulated;
-  n_contradicting_ +=
-      raw.names_shape && raw.correct != (raw.response == raw.shape) && !raw.timed_out;
-  n_late_answers_ += raw.timed_out && (raw.correct || !raw.response.empty());
-  keys_.push_back({row.participant, raw.session, raw.block, raw.trial,
-                   protocols_.number(raw.protocol), static_cast<std::uint32_t>(rows_.size())});
+  n_simulated_ += trial.simulated;
+  n_contradicting_ += trial.task == data::TaskRecord().task && !trial.timed_out &&
+                      correct != (trial.response == trial.shape);
+  n_late_answers_ += trial.timed_out && (correct || !trial.response.empty());
+  keys_.push_back({row.participant, trial.session, trial.block, trial.trial,
+                   protocols_.number(trial.protocol_sha256),
+                   static_cast<std::uint32_t>(rows_.size())});
   rows_.push_back(row);
-  if (raw.line > 0) lines_.push_back(static_cast<std::uint32_t>(raw.line));
+  if (trial.line > 0) lines_.push_back(static_cast<std::uint32_t>(trial.line));
 }
 
 void TrialTableBuilder::number_trials() {
@@ -645,8 +654,8 @@ bool is_protocol(std::string_view wanted, std::string_view name, std::string_vie
          (wanted.size() >= kDigits && sha256.starts_with(wanted));
 }
 
-TrialTable read_trials_store(const std::string& path, const std::string& protocol) {
-  data::Store store = data::Store::open(path, data::Store::Mode::read_only);
+TrialTable read_trials_store(data::Store& store, const std::string& protocol) {
+  const std::string& path = store.path();
   Provenance provenance;
   provenance.source = path;
   std::vector<std::string> stimuli, protocol_names, observers;
@@ -666,22 +675,12 @@ TrialTable read_trials_store(const std::string& path, const std::string& protoco
                                     "expected the renderer 'point' or 'ray'; found '" +
                                         printable(record.renderer, 40) + "'"}});
     }
-    RawTrial raw;
-    raw.participant = trial.participant.code;
-    raw.renderer = record.renderer;
-    raw.shape = record.shape;
-    raw.response = record.response;
-    raw.session = record.session;
-    raw.block = record.block;
-    raw.trial = record.trial;
-    raw.correct = record.correct;
-    raw.names_shape = record.task.task == data::TaskRecord().task;
-    raw.practice = record.practice;
-    raw.timed_out = record.timed_out;
-    raw.simulated = trial.participant.simulated;
-    raw.response_time = record.response_time;
-    raw.protocol = trial.protocol_sha256;
-    builder.add(raw);
+    StudyTrial one = study_trial_of(trial.participant.code, record);
+    one.correct = record.correct;
+    one.practice = record.practice;
+    one.simulated = trial.participant.simulated;
+    one.protocol_sha256 = trial.protocol_sha256;
+    builder.add(one);
     if (!record.practice) torque.add(record.renderer, notes.driven(trial));
     note_once(trial.protocol_name, protocol_names);
     note_once(trial.protocol_sha256, provenance.protocol_sha256);

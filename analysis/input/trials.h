@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <deque>
-#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -13,6 +12,12 @@
 #include <unordered_map>
 #include <utility>
 #include <vector>
+
+#include "analysis/input/study_trial.h"
+
+namespace palpate::data {
+class Store;
+}
 
 namespace palpate::analysis {
 
@@ -104,8 +109,8 @@ std::string pooled_protocols(const Provenance& provenance);
 bool is_protocol(std::string_view wanted, std::string_view name, std::string_view sha256);
 
 /// Reads the completed trials of a database. \param protocol  the one that is wanted
-/// \throws protocols::InputError if there are none, and what data::Store::open throws.
-TrialTable read_trials_store(const std::string& path, const std::string& protocol = "");
+/// \throws protocols::InputError if there are none.
+TrialTable read_trials_store(data::Store& store, const std::string& protocol = "");
 
 /// Number of faults listed; further ones are counted.
 constexpr std::size_t kMaxFaults = 50;
@@ -147,25 +152,12 @@ class Interner {
   std::uint32_t last_ = 0;
 };
 
-/// Response time of a time-out with an unknown limit.
-inline constexpr double kNoTime = std::numeric_limits<double>::quiet_NaN();
-
-/// A row of a source, practice included; see data/README.md for the columns.
-struct RawTrial {
-  std::string_view participant, renderer, shape, response;
-  std::string_view protocol{};  ///< its SHA-256; "": unknown
-  int session = 1, block = 1, trial = 1;
-  bool correct = false, practice = false, timed_out = false, simulated = false;
-  bool names_shape = true;   ///< the response names a shape, so that `correct` follows from both
-  double response_time = 0;  ///< s; kNoTime only for a time-out
-  std::size_t line = 0;      ///< line number in the file, from 1; 0: none
-};
-
 /// Turns rows into a TrialTable: drops practice, numbers and orders the levels of renderer and
 /// shape, and warns of contradictions.
 class TrialTableBuilder {
  public:
-  void add(const RawTrial& raw);
+  /// \param trial  of identification; practice is counted and left out
+  void add(const StudyTrial& trial);
   /// \param listed the stimuli in the protocol's order; empty: unknown
   /// \throws std::runtime_error: there are only practice trials, or a row is repeated exactly
   TrialTable finish(Provenance provenance, const std::vector<std::string>& listed = {});
@@ -187,7 +179,8 @@ class TrialTableBuilder {
   void check_repeated_trials(TrialTable& table);
   /// " (lines 2 and 7, 3 and 8, and 4 more)": pairs of rows with the same key.
   std::string lines_of(const std::vector<std::pair<std::uint32_t, std::uint32_t>>& rows) const;
-  /// Replaces kNoTime by the largest known limit, else by the longest time of all trials.
+  /// Replaces unknown times of time-outs by the largest known limit, else by the longest time of
+  /// all trials.
   void fill_times(TrialTable& table);
 
   Interner participants_, renderers_, stimuli_, protocols_;

@@ -14,7 +14,7 @@ struct MovementAnalysis;
 struct MovementPictures;
 struct MovementTable;
 struct SweepAnalysis;
-struct TaskAnalysis;
+struct StudyAnalysis;
 
 /// The analysis for a terminal: the conclusion, then warnings and tables. UTF-8, at most 100
 /// columns; long names are shortened, wide tables are split.
@@ -38,13 +38,13 @@ std::string report_html(const Analysis& analysis, const StudyRecord& record);
 // Of the tasks of a study of version 2.
 
 /// The analysis of the tasks of a study of version 2, for a terminal.
-std::string task_report_text(const TaskAnalysis& analysis);
+std::string task_report_text(const StudyAnalysis& analysis);
 /// The same as an HTML page with the figures.
 /// \param record  whether the study was checked against its registration
-std::string task_report_html(const TaskAnalysis& analysis, const std::string& program_version,
+std::string task_report_html(const StudyAnalysis& analysis, const std::string& program_version,
                              const StudyRecord& record = {});
 /// Every number, 17 significant digits. An infinite end of an interval is null.
-std::string task_report_json(const TaskAnalysis& analysis, const std::string& program_version);
+std::string task_report_json(const StudyAnalysis& analysis, const std::string& program_version);
 
 // Of movement.
 

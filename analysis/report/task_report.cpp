@@ -20,7 +20,7 @@ namespace palpate::analysis {
 namespace {
 
 /// The study's title, or its name, or its file.
-std::string study_of(const TaskTable& table) {
+std::string study_of(const StudyTable& table) {
   if (!table.title.empty()) return table.title;
   for (const auto& [name, sha256] : table.protocols) {
     if (!name.empty()) return name;
@@ -44,7 +44,7 @@ std::string explanation(const FunctionSettings& functions) {
 
 /// Notes on what a table without its protocol does not contain: the scale of levels, and whether
 /// numbers are steps.
-std::string scale_note(const TaskAnalysis& analysis) {
+std::string scale_note(const StudyAnalysis& analysis) {
   const bool unknown =
       analysis.table.procedures.empty() && !analysis.functions.scale &&
       std::any_of(analysis.cells.begin(), analysis.cells.end(), [](const auto& cell) {
@@ -105,13 +105,13 @@ std::string described_answers(const data::ParticipantColumn& column) {
   return text;
 }
 
-Table people_table(const TaskTable& source, const std::string& label) {
+Table people_table(const StudyTable& source, const std::string& label) {
   Table table;
   table.caption = label.empty() ? "Who took part" : "Who took part, " + label;
   table.header = {"column", "question", "answers", "answered"};
   table.n_names = 3;
   std::set<std::string> codes;
-  for (const TaskTrial& trial : source.trials) codes.insert(trial.participant);
+  for (const StudyTrial& trial : source.trials) codes.insert(trial.participant);
   for (const data::ParticipantColumn& one : source.people) {
     table.rows.push_back(
         {one.from.column, printable(one.from.question, 200), printable(described_answers(one), 400),
@@ -124,7 +124,7 @@ Table people_table(const TaskTable& source, const std::string& label) {
 /// Sections of a page of tasks: results over participants, figures, each task's numbers.
 class TaskPage {
  public:
-  TaskPage(const TaskAnalysis& analysis, const StudyRecord& record)
+  TaskPage(const StudyAnalysis& analysis, const StudyRecord& record)
       : analysis_(analysis),
         record_(record),
         label_(analysis.table.simulated ? "SIMULATED PARTICIPANTS" : ""),
@@ -145,7 +145,7 @@ class TaskPage {
 
  private:
   void put_header() {
-    const TaskTable& source = analysis_.table;
+    const StudyTable& source = analysis_.table;
     if (source.simulated)
       page_.put_banner(
           "SIMULATED PARTICIPANTS: numbers below are from a model of a participant, not from "
@@ -222,7 +222,7 @@ class TaskPage {
     page_.end_section();
   }
 
-  const TaskAnalysis& analysis_;
+  const StudyAnalysis& analysis_;
   const StudyRecord& record_;
   std::string label_;
   std::vector<Figure> figures_;
@@ -619,7 +619,7 @@ TaskJson group_comparison_json(const TaskGroupComparison& one) {
 
 /// Where a result stands by name: MEASURE.BLOCK, of several stimuli in a block
 /// MEASURE.BLOCK.STIMULUS.
-TaskJson& named_place(TaskJson& out, const TaskAnalysis& analysis, const std::string& measure,
+TaskJson& named_place(TaskJson& out, const StudyAnalysis& analysis, const std::string& measure,
                       const std::string& task, const std::string& block, const std::string& shape) {
   const bool several = std::ranges::any_of(analysis.cells, [&](const TaskCell& cell) {
     return cell.task == task && cell.block_name == block && cell.shape != shape;
@@ -659,7 +659,7 @@ void put_comparison(const TaskComparison& one, const ConditionDifference& differ
 }
 
 /// The name of a compared condition: BLOCK, of several stimuli in a block BLOCK.STIMULUS.
-std::string short_condition(const TaskAnalysis& analysis, const TaskComparison& one,
+std::string short_condition(const StudyAnalysis& analysis, const TaskComparison& one,
                             const std::string& condition) {
   if (!one.block_name.empty()) return condition;
   for (const TaskCell& cell : analysis.cells) {
@@ -678,7 +678,7 @@ std::string short_condition(const TaskAnalysis& analysis, const TaskComparison& 
 /// Comparisons of blocks and stimuli: between.MEASURE.REFERENCE.COMPARED, where a condition is
 /// BLOCK or BLOCK.STIMULUS; of ratings between.rating.BLOCK.STIMULUS.STIMULUS. Of several renderers
 /// the renderer follows.
-void put_conditions(const TaskAnalysis& analysis, TaskJson& out) {
+void put_conditions(const StudyAnalysis& analysis, TaskJson& out) {
   std::set<std::string> renderers;
   for (const TaskCell& cell : analysis.cells) renderers.insert(cell.renderer);
   for (const TaskComparison& one : analysis.conditions) {
@@ -696,7 +696,7 @@ void put_conditions(const TaskAnalysis& analysis, TaskJson& out) {
 }
 
 /// The group's values without a model: means of exponents, ratings and settings.
-void put_means(const TaskAnalysis& analysis, TaskJson& out) {
+void put_means(const StudyAnalysis& analysis, TaskJson& out) {
   for (const TaskGroup& group : analysis.groups) {
     for (const GroupMean& one : group.renderers) {
       if (one.of_model || !one.mean) continue;
@@ -716,7 +716,7 @@ void put_means(const TaskAnalysis& analysis, TaskJson& out) {
 
 /// Results by name, for hypotheses: objects, as elements of lists have no names. Of more than two
 /// renderers the compared one is a part of the name.
-TaskJson named_json(const TaskAnalysis& analysis) {
+TaskJson named_json(const StudyAnalysis& analysis) {
   TaskJson out = TaskJson::object();
   for (const TaskGroupModel& one : analysis.group_models.models) {
     TaskJson& place = named_place(out, analysis, leveled(one.measure, one.level), one.task,
@@ -1056,7 +1056,7 @@ std::string comparison_text(const TaskComparison& one, bool of_renderers) {
 }
 
 /// The group's d' and criterion, level by level.
-std::string group_detection_text(const TaskAnalysis& analysis) {
+std::string group_detection_text(const StudyAnalysis& analysis) {
   std::string text;
   for (const TaskGroupModel& one : analysis.group_models.models) {
     if (!one.level) continue;
@@ -1071,7 +1071,7 @@ std::string group_detection_text(const TaskAnalysis& analysis) {
 }
 
 /// The group's differences between renderers.
-std::string group_model_text(const TaskAnalysis& analysis) {
+std::string group_model_text(const StudyAnalysis& analysis) {
   const TaskGroupResults& results = analysis.group_models;
   if (results.comparisons.empty()) return "";
   std::string text = "The group compared between renderers (hierarchical model of all answers)\n";
@@ -1094,12 +1094,12 @@ std::string group_model_text(const TaskAnalysis& analysis) {
 
 }  // namespace
 
-std::string task_report_html(const TaskAnalysis& analysis, const std::string& program_version,
+std::string task_report_html(const StudyAnalysis& analysis, const std::string& program_version,
                              const StudyRecord& record) {
   return TaskPage(analysis, record).html(program_version);
 }
 
-std::string task_report_json(const TaskAnalysis& analysis, const std::string& program_version) {
+std::string task_report_json(const StudyAnalysis& analysis, const std::string& program_version) {
   TaskJson out{{"version", 1},
                {"simulated", analysis.table.simulated},
                {"title", analysis.table.title},
@@ -1130,7 +1130,7 @@ std::string task_report_json(const TaskAnalysis& analysis, const std::string& pr
   return out.dump(1, ' ', false, TaskJson::error_handler_t::replace) + "\n";
 }
 
-std::string task_report_text(const TaskAnalysis& analysis) {
+std::string task_report_text(const StudyAnalysis& analysis) {
   std::string text;
   if (analysis.table.simulated) text += "SIMULATED PARTICIPANTS\n\n";
   if (!analysis.groups.empty() || analysis.identification)

@@ -32,7 +32,7 @@ std::string labelled(const std::string& caption, const std::string& label) {
   return label.empty() ? caption : caption + " (" + label + ")";
 }
 
-std::string label_of(const TaskAnalysis& analysis) {
+std::string label_of(const StudyAnalysis& analysis) {
   return analysis.table.simulated ? "SIMULATED PARTICIPANTS" : "";
 }
 
@@ -70,7 +70,7 @@ std::string remarks_on(const GroupMean& one) {
   return text;
 }
 
-Table means_table(const TaskAnalysis& analysis) {
+Table means_table(const StudyAnalysis& analysis) {
   Table table;
   table.caption = labelled("Means over participants", label_of(analysis));
   table.header = {"measure",       "task, block, stimulus", "renderer", "mean",
@@ -110,7 +110,7 @@ std::string ends_of(const std::optional<double>& low, const std::optional<double
 }
 
 /// d' and criterion at each level.
-Table detection_model_table(const TaskAnalysis& analysis) {
+Table detection_model_table(const StudyAnalysis& analysis) {
   Table table;
   table.caption = labelled("Detection over participants, level by level", label_of(analysis));
   table.header = {"measure",       "task, block, stimulus",   "level",       "renderer", "value",
@@ -131,7 +131,7 @@ std::string pair_of(const TaskGroupComparison& one) {
   return printable(one.compared) + (one.ratio ? " / " : " − ") + printable(one.reference);
 }
 
-Table model_differences_table(const TaskAnalysis& analysis) {
+Table model_differences_table(const StudyAnalysis& analysis) {
   const auto& comparisons = analysis.group_models.comparisons;
   Table table;
   table.caption = labelled("Comparison of the group between renderers", label_of(analysis));
@@ -173,7 +173,7 @@ std::string few_pairs_note(const std::vector<TaskComparison>& comparisons) {
 }
 
 /// \param of_renderers  otherwise of blocks and stimuli
-Table differences_table(const TaskAnalysis& analysis, bool of_renderers) {
+Table differences_table(const StudyAnalysis& analysis, bool of_renderers) {
   const auto& comparisons = of_renderers ? analysis.renderers : analysis.conditions;
   const bool adjusted = any_adjusted(comparisons);
   const bool rated = std::ranges::any_of(
@@ -270,7 +270,7 @@ std::string place_of(const std::string& measure, const std::string& block,
 }
 
 /// The ratio of JNDs stands for that of Weber fractions.
-std::vector<Told> differences_of_renderers(const TaskAnalysis& analysis) {
+std::vector<Told> differences_of_renderers(const StudyAnalysis& analysis) {
   std::vector<Told> all;
   for (const TaskGroupComparison& one : analysis.group_models.comparisons) {
     if (!one.p_holm || one.measure == "weber_fraction" || one.level) continue;
@@ -291,7 +291,7 @@ std::vector<Told> differences_of_renderers(const TaskAnalysis& analysis) {
 }
 
 /// What differs clearly between renderers, and in what there is no clear difference.
-std::string finding_on_renderers(const TaskAnalysis& analysis) {
+std::string finding_on_renderers(const StudyAnalysis& analysis) {
   std::vector<std::string> clear, unclear;
   std::size_t more = 0;
   for (const Told& one : differences_of_renderers(analysis)) {
@@ -319,7 +319,7 @@ std::string finding_on_renderers(const TaskAnalysis& analysis) {
 }
 
 /// Highest and lowest of the rated stimuli of a block, and how many pairs differ clearly.
-std::string finding_on_ratings(const TaskAnalysis& analysis) {
+std::string finding_on_ratings(const StudyAnalysis& analysis) {
   std::size_t pairs = 0, clear = 0;
   for (const TaskComparison& one : analysis.conditions) {
     if (one.measure != "rating") continue;
@@ -343,7 +343,7 @@ std::string finding_on_ratings(const TaskAnalysis& analysis) {
 }
 
 /// The first means.
-std::string finding_on_means(const TaskAnalysis& analysis) {
+std::string finding_on_means(const StudyAnalysis& analysis) {
   std::string text;
   std::size_t told = 0;
   for (const TaskGroup& group : analysis.groups) {
@@ -555,7 +555,7 @@ Table steps_table(const TaskCell& cell, const std::string& label) {
   return table;
 }
 
-Table information_table(const TaskAnalysis& analysis) {
+Table information_table(const StudyAnalysis& analysis) {
   Table table;
   table.caption = labelled("Information transfer", label_of(analysis));
   table.header = {"task, block", "renderer",   "bits, pooled",         "of",
@@ -578,7 +578,7 @@ Table information_table(const TaskAnalysis& analysis) {
   return table;
 }
 
-Table confidence_table(const TaskAnalysis& analysis) {
+Table confidence_table(const StudyAnalysis& analysis) {
   Table table;
   table.caption = labelled("Confidence: area under the type 2 ROC", label_of(analysis));
   table.header = {
@@ -610,7 +610,7 @@ std::string stimulus_of(const std::string& task, const std::string& block,
   return name;
 }
 
-bool has_model(const TaskAnalysis& analysis, const TaskComparison& one) {
+bool has_model(const StudyAnalysis& analysis, const TaskComparison& one) {
   return std::ranges::any_of(
       analysis.group_models.comparisons, [&](const TaskGroupComparison& other) {
         return other.task == one.task && other.block_name == one.block_name &&
@@ -618,7 +618,7 @@ bool has_model(const TaskAnalysis& analysis, const TaskComparison& one) {
       });
 }
 
-std::vector<Table> group_tables(const TaskAnalysis& analysis) {
+std::vector<Table> group_tables(const StudyAnalysis& analysis) {
   std::vector<Table> tables{means_table(analysis), model_differences_table(analysis),
                             detection_model_table(analysis), differences_table(analysis, true),
                             differences_table(analysis, false)};
@@ -643,7 +643,7 @@ std::string group_sentence(const TaskGroupComparison& one) {
   return text + ", n = " + std::to_string(one.n);
 }
 
-std::vector<std::string> sentences_to_quote(const TaskAnalysis& analysis) {
+std::vector<std::string> sentences_to_quote(const StudyAnalysis& analysis) {
   std::vector<std::string> sentences;
   const bool of_renderers = !analysis.renderers.empty();
   const std::string label = label_of(analysis);
@@ -671,7 +671,7 @@ std::vector<std::string> sentences_to_quote(const TaskAnalysis& analysis) {
   return sentences;
 }
 
-std::string conclusion(const TaskAnalysis& analysis) {
+std::string conclusion(const StudyAnalysis& analysis) {
   std::string text;
   if (analysis.identification) text = conclusion(*analysis.identification) + " ";
   text += finding_on_renderers(analysis);
@@ -698,7 +698,7 @@ std::vector<Table> cell_tables(const TaskCell& cell, const std::string& label) {
   return tables;
 }
 
-std::vector<Table> summary_tables(const TaskAnalysis& analysis) {
+std::vector<Table> summary_tables(const StudyAnalysis& analysis) {
   std::vector<Table> tables{information_table(analysis), confidence_table(analysis)};
   std::erase_if(tables, [](const Table& table) { return table.rows.empty(); });
   return tables;

@@ -11,8 +11,6 @@
 namespace palpate::analysis {
 namespace {
 
-constexpr double kAlpha = 0.05;
-
 struct Share {
   double trials = 0, correct = 0;
   double value() const { return correct / trials; }

@@ -281,8 +281,7 @@ constexpr double kManyTimeOuts = 0.05;       // of a cell's trials
 constexpr double kUnequalTimeOuts = 0.025;   // difference of two renderers' proportions for a shape
 constexpr double kConcentrated = 1.5;        // ratio of a participant's proportion to the cell's
 constexpr std::size_t kMostNamed = 6;        // shapes or comparisons named in a warning
-constexpr double kAlpha = 0.05;
-constexpr double kLongTime = 600;  // s; a longer mean suggests times in milliseconds
+constexpr double kLongTime = 600;            // s; a longer mean suggests times in milliseconds
 
 Exclusions count_exclusions(const Description& description, std::size_t renderer) {
   Exclusions out;

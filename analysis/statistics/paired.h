@@ -19,6 +19,9 @@ class Random;
 
 namespace palpate::analysis {
 
+/// Of every test, two-sided.
+inline constexpr double kAlpha = 0.05;
+
 /// 95 % confidence interval, of log ratios or of percent reductions.
 struct Interval {
   double low = 0, high = 0;

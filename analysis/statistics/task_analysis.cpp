@@ -157,8 +157,8 @@ std::vector<std::size_t> reversals_of(const Track& track) {
 }
 
 /// The spec of a track; nullptr: the source has no protocol, or not its number.
-const protocols::ProcedureSpec* spec_of(const Track& track, const TaskTrial& trial,
-                                        const TaskTable& table, int& number) {
+const protocols::ProcedureSpec* spec_of(const Track& track, const StudyTrial& trial,
+                                        const StudyTable& table, int& number) {
   const protocols::BlockProcedures* const block = block_of(trial, table);
   if (block == nullptr || block->specs.empty()) return nullptr;
   number = 0;
@@ -167,7 +167,7 @@ const protocols::ProcedureSpec* spec_of(const Track& track, const TaskTrial& tri
 }
 
 /// Sets procedure and reversals of a track with a known spec.
-void replay(Track& track, const TaskTrial& trial, const TaskTable& table,
+void replay(Track& track, const StudyTrial& trial, const StudyTable& table,
             const protocols::ProcedureSpec& spec, int number) {
   if (std::holds_alternative<protocols::ConstantStimuli>(spec)) return;
   const auto* const staircase = std::get_if<protocols::Staircase>(&spec);
@@ -188,12 +188,12 @@ void replay(Track& track, const TaskTrial& trial, const TaskTable& table,
 }
 
 using protocols::LevelScale;
-using Trials = std::vector<const TaskTrial*>;
+using Trials = std::vector<const StudyTrial*>;
 using CellKey = std::tuple<std::string, std::string, std::string, std::string>;
 
 struct Context {
   const FunctionSettings& settings;
-  const TaskTable& table;
+  const StudyTable& table;
 };
 
 /// Groups in the order of their first trial.
@@ -201,7 +201,7 @@ template <class Key, class KeyOf>
 std::vector<std::pair<Key, Trials>> grouped(const Trials& trials, KeyOf key_of) {
   std::vector<std::pair<Key, Trials>> groups;
   std::map<Key, std::size_t> places;
-  for (const TaskTrial* trial : trials) {
+  for (const StudyTrial* trial : trials) {
     const auto [place, is_new] = places.emplace(key_of(*trial), groups.size());
     if (is_new) groups.push_back({place->first, {}});
     groups[place->second].second.push_back(trial);
@@ -210,12 +210,12 @@ std::vector<std::pair<Key, Trials>> grouped(const Trials& trials, KeyOf key_of) 
 }
 
 std::vector<std::pair<std::string, Trials>> by_participant(const Trials& trials) {
-  return grouped<std::string>(trials, [](const TaskTrial& trial) { return trial.participant; });
+  return grouped<std::string>(trials, [](const StudyTrial& trial) { return trial.participant; });
 }
 
 std::vector<LevelCount> counts_of_levels(const Trials& trials) {
   std::vector<LevelCount> counts;
-  for (const TaskTrial* trial : trials) {
+  for (const StudyTrial* trial : trials) {
     if (trial->answered && trial->level && !trial->catch_trial)
       counts.push_back({*trial->level, 1, trial->success ? 1 : 0});
   }
@@ -237,7 +237,7 @@ protocols::Easier easier_of(const std::vector<LevelCount>& counts) {
 /// False alarms: successes in catch trials.
 DetectionCounts detections_of(const Trials& trials) {
   DetectionCounts counts;
-  for (const TaskTrial* trial : trials) {
+  for (const StudyTrial* trial : trials) {
     if (!trial->answered) continue;
     (trial->catch_trial ? counts.noise_trials : counts.signal_trials) += 1;
     if (trial->success) (trial->catch_trial ? counts.false_alarms : counts.hits) += 1;
@@ -294,7 +294,7 @@ std::optional<protocols::Easier> expected_easier(const TaskCell& cell, const Tri
                                                  bool above, bool below, const Context& context) {
   using protocols::Easier;
   if (cell.task == "compare" && above != below) return above ? Easier::higher : Easier::lower;
-  for (const TaskTrial* trial : trials) {
+  for (const StudyTrial* trial : trials) {
     for (const protocols::ProcedureSpec& spec : specs_of(*trial, context.table)) {
       if (const auto easier = easier_of_adaptive(spec)) return easier;
     }
@@ -384,7 +384,7 @@ LevelScale scale_of(const Trials& trials, const Context& context) {
   if (context.settings.scale) return *context.settings.scale;
   if (context.settings.shape == protocols::PsychometricShape::weibull) return LevelScale::log10;
   bool adaptive = false;
-  for (const TaskTrial* trial : trials) {
+  for (const StudyTrial* trial : trials) {
     for (const protocols::ProcedureSpec& spec : specs_of(*trial, context.table)) {
       const std::optional<LevelScale> scale = scale_of_adaptive(spec);
       if (scale == LevelScale::linear) return LevelScale::linear;
@@ -397,7 +397,7 @@ LevelScale scale_of(const Trials& trials, const Context& context) {
 
 void add_functions(TaskCell& cell, const Trials& trials, const Context& context) {
   bool above = false, below = false;
-  for (const TaskTrial* trial : trials) {
+  for (const StudyTrial* trial : trials) {
     if (trial->standard_level) cell.standard_level = trial->standard_level;
     if (trial->intervals > 0) cell.intervals = trial->intervals;
     cell.same_different |= trial->response == "same" || trial->response == "different";
@@ -413,7 +413,7 @@ void add_functions(TaskCell& cell, const Trials& trials, const Context& context)
   cell.scale = scale_of(trials, context);
   if (cell.no_function.empty() && cell.scale != LevelScale::linear &&
       std::any_of(trials.begin(), trials.end(),
-                  [](const TaskTrial* trial) { return trial->level && *trial->level < 0; }))
+                  [](const StudyTrial* trial) { return trial->level && *trial->level < 0; }))
     cell.no_function = "levels below 0 have no place on a logarithmic scale";
   cell.expected_easier = expected_easier(cell, trials, above, below, context);
   const protocols::Easier usual =
@@ -424,14 +424,14 @@ void add_functions(TaskCell& cell, const Trials& trials, const Context& context)
 
 /// The labelled steps of a cell's ratings, from the protocol or, without one, from labels that are
 /// the answers; empty: numbers were typed, or nothing says.
-std::vector<RatingStep> rating_steps(const Trials& trials, const TaskTable& table) {
+std::vector<RatingStep> rating_steps(const Trials& trials, const StudyTable& table) {
   std::vector<RatingStep> steps;
   if (const auto* block = block_of(*trials.front(), table)) {
     for (const auto& step : block->rating_steps) steps.push_back({step.number, step.label, 0, 0});
     return steps;
   }
   std::map<double, std::string> labels;
-  for (const TaskTrial* trial : trials) {
+  for (const StudyTrial* trial : trials) {
     if (!trial->answered || !trial->number) continue;
     const bool label = trial->response.find_first_not_of("0123456789.,+-eE ") != std::string::npos;
     std::string& known = labels[*trial->number];
@@ -446,15 +446,15 @@ std::vector<RatingStep> rating_steps(const Trials& trials, const TaskTable& tabl
 }
 
 /// \return false: numbers of any size were given to levels, so magnitude estimation describes them
-bool add_ratings(TaskCell& cell, const Trials& trials, const TaskTable& table) {
+bool add_ratings(TaskCell& cell, const Trials& trials, const StudyTable& table) {
   std::vector<RatingStep> steps = rating_steps(trials, table);
   const bool levels =
-      std::ranges::any_of(trials, [](const TaskTrial* trial) { return trial->level.has_value(); });
+      std::ranges::any_of(trials, [](const StudyTrial* trial) { return trial->level.has_value(); });
   if (steps.empty() && levels) return false;
   std::vector<Rating> ratings;
   std::size_t number = 0;
   for (const auto& [participant, own] : by_participant(trials)) {
-    for (const TaskTrial* trial : own) {
+    for (const StudyTrial* trial : own) {
       if (trial->answered && trial->number)
         ratings.push_back({number, *trial->number, trial->level});
     }
@@ -468,7 +468,7 @@ void add_magnitude(TaskCell& cell, const Trials& trials) {
   std::vector<MagnitudeTrial> judged;
   std::size_t number = 0;
   for (const auto& [participant, own] : by_participant(trials)) {
-    for (const TaskTrial* trial : own) {
+    for (const StudyTrial* trial : own) {
       if (trial->answered && trial->level && trial->number)
         judged.push_back({number, *trial->level, *trial->number});
     }
@@ -481,7 +481,7 @@ void add_adjustments(TaskCell& cell, const Trials& trials) {
   std::vector<AdjustmentTrial> settings;
   std::size_t number = 0;
   for (const auto& [participant, own] : by_participant(trials)) {
-    for (const TaskTrial* trial : own) {
+    for (const StudyTrial* trial : own) {
       if (trial->answered && trial->level && trial->number && trial->standard_level)
         settings.push_back({number, *trial->standard_level, *trial->number,
                             *trial->level > *trial->standard_level});
@@ -493,14 +493,14 @@ void add_adjustments(TaskCell& cell, const Trials& trials) {
 
 InformationTransfer transfer_of(const Trials& trials) {
   std::map<std::string, std::size_t> stimuli, answers;
-  for (const TaskTrial* trial : trials) {
+  for (const StudyTrial* trial : trials) {
     if (!trial->answered) continue;
     stimuli.emplace(trial->shape, stimuli.size());
     answers.emplace(trial->response, answers.size());
   }
   std::vector<std::vector<std::size_t>> counts(stimuli.size(),
                                                std::vector<std::size_t>(answers.size(), 0));
-  for (const TaskTrial* trial : trials) {
+  for (const StudyTrial* trial : trials) {
     if (trial->answered) ++counts[stimuli[trial->shape]][answers[trial->response]];
   }
   return information_transfer(counts);
@@ -515,7 +515,7 @@ void add_information(TaskCell& cell, const Trials& trials) {
     if (cell.informations.back().corrected) bits.push_back(*cell.informations.back().corrected);
   }
   std::set<std::string> stimuli, answers;
-  for (const TaskTrial* trial : trials) {
+  for (const StudyTrial* trial : trials) {
     if (!trial->answered) continue;
     stimuli.insert(trial->shape);
     answers.insert(trial->response);
@@ -528,7 +528,7 @@ void add_information(TaskCell& cell, const Trials& trials) {
 
 std::vector<ConfidenceTrial> confident_answers(const Trials& trials) {
   std::vector<ConfidenceTrial> sure;
-  for (const TaskTrial* trial : trials) {
+  for (const StudyTrial* trial : trials) {
     if (trial->answered && trial->confidence && trial->correct)
       sure.push_back({*trial->correct, *trial->confidence});
   }
@@ -554,7 +554,7 @@ TaskCell cell_of(const CellKey& key, const Trials& trials, const Context& contex
   TaskCell cell;
   std::tie(cell.task, cell.block_name, cell.shape, cell.renderer) = key;
   cell.trials = trials.size();
-  for (const TaskTrial* trial : trials) {
+  for (const StudyTrial* trial : trials) {
     cell.answered += trial->answered ? 1 : 0;
     cell.judged += trial->correct ? 1 : 0;
     cell.correct += trial->correct.value_or(false) ? 1 : 0;
@@ -673,7 +673,7 @@ InformationTransfer information_transfer(const CountTable& counts) {
   return result;
 }
 
-const protocols::BlockProcedures* block_of(const TaskTrial& trial, const TaskTable& table) {
+const protocols::BlockProcedures* block_of(const StudyTrial& trial, const StudyTable& table) {
   const auto protocol = table.procedures.find(trial.protocol_sha256);
   if (protocol == table.procedures.end()) return nullptr;
   const auto block = protocol->second.find(trial.block_name);
@@ -700,16 +700,17 @@ std::optional<protocols::Easier> easier_of_adaptive(const protocols::ProcedureSp
   return std::nullopt;
 }
 
-const std::vector<protocols::ProcedureSpec>& specs_of(const TaskTrial& trial,
-                                                      const TaskTable& table) {
+const std::vector<protocols::ProcedureSpec>& specs_of(const StudyTrial& trial,
+                                                      const StudyTable& table) {
   static const std::vector<protocols::ProcedureSpec> kNone;
   const protocols::BlockProcedures* const block = block_of(trial, table);
   return block == nullptr ? kNone : block->specs;
 }
 
-std::vector<Track> tracks_of(const std::vector<const TaskTrial*>& trials, const TaskTable& table) {
-  std::map<std::string, std::vector<const TaskTrial*>> named;
-  for (const TaskTrial* trial : trials) {
+std::vector<Track> tracks_of(const std::vector<const StudyTrial*>& trials,
+                             const StudyTable& table) {
+  std::map<std::string, std::vector<const StudyTrial*>> named;
+  for (const StudyTrial* trial : trials) {
     if (trial->level && !trial->catch_trial && trial->answered)
       named[trial->track].push_back(trial);
   }
@@ -718,7 +719,7 @@ std::vector<Track> tracks_of(const std::vector<const TaskTrial*>& trials, const 
     if (own.size() < 2) continue;
     Track track;
     track.name = name;
-    for (const TaskTrial* trial : own) {
+    for (const StudyTrial* trial : own) {
       track.levels.push_back(*trial->level);
       track.successes.push_back(trial->success);
     }
@@ -747,15 +748,16 @@ void add_fitted_levels(std::vector<Track>& tracks, const PsychometricModel& mode
   }
 }
 
-TaskAnalysis analyze_tasks(TaskTable table, const FunctionSettings& functions,
-                           const AnalysisSettings& settings, const std::string& program_version) {
-  TaskAnalysis result;
+StudyAnalysis analyze_study(StudyTable table, const FunctionSettings& functions,
+                            const AnalysisSettings& settings, const std::string& program_version) {
+  StudyAnalysis result;
+  result.program_version = program_version;
   result.table = std::move(table);
   result.functions = functions;
   const Context context{functions, result.table};
   Trials all;
-  for (const TaskTrial& trial : result.table.trials) all.push_back(&trial);
-  const auto key_of = [](const TaskTrial& trial) {
+  for (const StudyTrial& trial : result.table.trials) all.push_back(&trial);
+  const auto key_of = [](const StudyTrial& trial) {
     // Identification takes all stimuli of a block together.
     return CellKey{trial.task, trial.block_name, trial.task == "identify" ? "" : trial.shape,
                    trial.renderer};
@@ -768,9 +770,9 @@ TaskAnalysis analyze_tasks(TaskTable table, const FunctionSettings& functions,
   result.group_models = group_models(result.cells, result.renderers);
   name_left_out(result.cells, result.groups, result.group_models);
   put_model_values(result.group_models.models, result.groups);
-  if (auto shapes = identification_of(result.table)) {
-    result.identification = analyze(std::move(*shapes), settings, program_version);
-  }
+  identify_times(result.table);
+  if (auto times = std::exchange(result.table.times, std::nullopt))
+    result.identification = analyze(std::move(*times), settings, program_version);
   return result;
 }
 

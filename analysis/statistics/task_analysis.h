@@ -1,5 +1,5 @@
 #pragma once
-// Results of each task of a study of version 2, by block, stimulus and renderer.
+// The analysis of a study: of each task by block, stimulus and renderer, and of identification.
 
 #include <cstddef>
 #include <cstdint>
@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "analysis/input/task_trials.h"
+#include "analysis/input/study_table.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/discrimination.h"
 #include "analysis/statistics/mixed_model.h"
@@ -128,10 +128,10 @@ std::optional<protocols::LevelScale> scale_of_adaptive(const protocols::Procedur
 /// The levels that are easier in an adaptive procedure; nullopt: it is not adaptive.
 std::optional<protocols::Easier> easier_of_adaptive(const protocols::ProcedureSpec& spec);
 /// The procedure of a trial's block; nullptr: the source has no protocol.
-const protocols::BlockProcedures* block_of(const TaskTrial& trial, const TaskTable& table);
+const protocols::BlockProcedures* block_of(const StudyTrial& trial, const StudyTable& table);
 /// The procedures of a trial's block; empty: none, or the source has no protocol.
-const std::vector<protocols::ProcedureSpec>& specs_of(const TaskTrial& trial,
-                                                      const TaskTable& table);
+const std::vector<protocols::ProcedureSpec>& specs_of(const StudyTrial& trial,
+                                                      const StudyTable& table);
 
 /// The trials of a track in order, those without an answer left out.
 struct Track {
@@ -147,7 +147,7 @@ struct Track {
 };
 
 /// The tracks with more than one trial among a participant's trials in a cell.
-std::vector<Track> tracks_of(const std::vector<const TaskTrial*>& trials, const TaskTable& table);
+std::vector<Track> tracks_of(const std::vector<const StudyTrial*>& trials, const StudyTable& table);
 /// Sets fitted_level of staircases. \param fit  of the same trials
 void add_fitted_levels(std::vector<Track>& tracks, const PsychometricModel& model,
                        const PsychometricFit& fit);
@@ -221,20 +221,21 @@ struct TaskCell {
   TransformedMean confidence_mean;   ///< of the participants' areas
 };
 
-struct TaskAnalysis {
-  TaskTable table;
+struct StudyAnalysis {
+  StudyTable table;  ///< without times, which the analysis of identification holds
   FunctionSettings functions;
+  std::string program_version;
   std::vector<TaskCell> cells;
   std::vector<TaskGroup> groups;
   std::vector<TaskComparison> renderers, conditions;
   TaskGroupResults group_models;
-  /// The report of version 1 on identification, over all its blocks; none: no identification.
+  /// Times and accuracy of identification, over all its blocks; none: no identification.
   std::optional<Analysis> identification;
 };
 
-/// \param settings, program_version  of the analysis of identification
-TaskAnalysis analyze_tasks(TaskTable table, const FunctionSettings& functions,
-                           const AnalysisSettings& settings = {},
-                           const std::string& program_version = {});
+/// \param settings  of the analysis of identification
+StudyAnalysis analyze_study(StudyTable table, const FunctionSettings& functions,
+                            const AnalysisSettings& settings = {},
+                            const std::string& program_version = {});
 
 }  // namespace palpate::analysis

@@ -186,7 +186,7 @@ void MotionEvents::add(const StoredTrial& trial, std::int64_t slot) {
   event.correct = correct_of(record);
   event.orientation_wxyz = record.orientation_wxyz;
   events_.push_back(event);
-  if (!record.task.of_block()) return;
+  if (record.task.intervals.empty()) return;
   const std::int64_t begin = first_onset_ns(record);
   const auto seconds = [](std::int64_t from_ns, std::int64_t to_ns) {
     return (static_cast<double>(to_ns) - static_cast<double>(from_ns)) / 1e9;
@@ -417,7 +417,7 @@ void BidsRecording::add(const StoredTrial& trial, const std::string& path) {
                              {"renderer", guarded_text(record.renderer)},
                              {"shape", guarded_text(record.shape)},
                              {"orientation_wxyz", record.orientation_wxyz}});
-  if (record.task.of_block()) about["intervals"] = intervals_json(record.task);
+  if (!record.task.intervals.empty()) about["intervals"] = intervals_json(record.task);
   if (settings_.motion) events_.add(trial, onset);
 }
 

@@ -17,8 +17,9 @@
 #include "protocols/parse_scene.h"
 #include "protocols/protocol.h"
 #include "protocols/schedule.h"
+#include "protocols/tasks/block_order.h"
+#include "protocols/tasks/block_trials.h"
 #include "protocols/tasks/levels.h"
-#include "protocols/tasks/task_plan.h"
 
 namespace palpate::protocols {
 namespace {

@@ -21,6 +21,7 @@ constexpr NumberRange kTrials{1, 10000};
 constexpr NumberRange kRun{1, 10};
 constexpr NumberRange kShare{0, 1};
 constexpr std::size_t kMostLevels = 1000;
+constexpr std::size_t kMaxTracks = 16;
 constexpr double kMostSeriesLevels = 1000;
 // 32 MB of tables and some ms a trial; Watson's examples need a tenth.
 constexpr double kMostCells = 4e6;
@@ -229,6 +230,19 @@ std::optional<ProcedureSpec> read_procedure(ObjectReader& reader) {
   reader.refuse_unknown_keys();
   if (reader.faults().count() != before) return std::nullopt;
   return spec;
+}
+
+void read_procedures(ObjectReader& block, std::vector<ProcedureSpec>& procedures) {
+  const json* const value = block.member("procedure");
+  if (value == nullptr) return;
+  const std::string pointer = block.pointer("procedure");
+  const auto read_one = [&](const json& one, const std::string& where) {
+    ObjectReader procedure(one, where, block.faults());
+    if (auto spec = read_procedure(procedure)) procedures.push_back(std::move(*spec));
+  };
+  if (!value->is_array()) return read_one(*value, pointer);
+  if (block.array("procedure", 1, kMaxTracks) == nullptr) return;
+  for (std::size_t i = 0; i < value->size(); ++i) read_one((*value)[i], child_pointer(pointer, i));
 }
 
 }  // namespace palpate::protocols

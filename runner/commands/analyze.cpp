@@ -15,6 +15,7 @@
 #include "analysis/movement/comparison.h"
 #include "analysis/movement/pictures.h"
 #include "analysis/report/report.h"
+#include "analysis/report/study_report.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/task_analysis.h"
 #include "data/base/checksum.h"
@@ -27,7 +28,6 @@
 #include "runner/commands/sweep/planned.h"
 #include "runner/output/outputs.h"
 #include "runner/registration/bundle_contents.h"
-#include "runner/study/study_analysis.h"
 #include "runner/study/study_trials.h"
 
 namespace palpate::runner::commands {
@@ -52,16 +52,16 @@ void check(const boost::program_options::variables_map& values,
   }
 }
 
-void put(output::Outputs& outputs, const analysis::Analysis& analysis,
+void put(output::Outputs& outputs, const analysis::StudyAnalysis& analysis,
          const analysis::StudyRecord& record) {
   if (outputs.wanted("figures")) {
-    for (const analysis::Figure& figure : analysis::figures_of(analysis, record)) {
+    for (const analysis::Figure& figure : analysis::study_figures(analysis, record)) {
       outputs.put_into_folder(figure.id + ".svg",
                               analysis::figure_svg(figure, analysis::light_palette()));
     }
   }
-  if (outputs.wanted("json")) outputs.put("json", analysis::report_json(analysis));
-  if (outputs.wanted("report")) outputs.put("report", analysis::report_html(analysis, record));
+  if (outputs.wanted("json")) outputs.put("json", analysis::study_json(analysis));
+  if (outputs.wanted("report")) outputs.put("report", analysis::study_html(analysis, record));
 }
 
 /// \throws UsageError
@@ -100,25 +100,6 @@ std::vector<analysis::ProtocolText> protocols_in(const std::string& file) {
     throw UsageError(printable(file) +
                      ": expected a protocol with blocks, or record.json of a bundle");
   return {{json.value("name", ""), checksum_hex(text), text, stored.title, stored.seed}};
-}
-
-/// Analyses a study of version 2, or its export.
-void analyze_tasks_of(const std::string& database, const std::string& csv,
-                      const std::string& protocol, const std::string& design,
-                      const analysis::AnalysisSettings& settings,
-                      const analysis::FunctionSettings& functions, output::Outputs& outputs) {
-  const analysis::TaskAnalysis found = analysis::analyze_tasks(
-      study::read_study_tasks(database, csv, protocol, protocols_in(design)), functions, settings,
-      PALPATE_VERSION);
-  if (outputs.wanted("json")) outputs.put("json", task_report_json(found, PALPATE_VERSION));
-  if (outputs.wanted("report")) outputs.put("report", task_report_html(found, PALPATE_VERSION));
-  if (outputs.wanted("figures")) {
-    for (const analysis::Figure& figure : study::figures_of(study::StudyAnalysis(found), {}))
-      outputs.put_into_folder(figure.id + ".svg",
-                              analysis::figure_svg(figure, analysis::light_palette()));
-  }
-  outputs.write();
-  std::cout << task_report_text(found);
 }
 
 /// Checks the options of --movement and those that exclude it.
@@ -271,22 +252,15 @@ int analyze_command(const std::vector<std::string>& args) {
     analyze_movement_of(movement, outputs);
     return 0;
   }
-  if (!design.empty() || study::is_of_tasks(database, csv, protocol)) {
-    analyze_tasks_of(database, csv, protocol, design, settings, functions, outputs);
-    return 0;
-  }
-
-  if (!(*values)["function"].defaulted() || values->count("scale"))
+  study::Study study = study::read_study({database, csv, protocol, protocols_in(design)},
+                                         outputs.wanted("report") || outputs.wanted("figures"));
+  if (study.table.trials.empty() && (!(*values)["function"].defaulted() || values->count("scale")))
     throw UsageError("--function, --scale: there are no tasks with psychometric functions");
-  const analysis::Analysis analysis = analysis::analyze(
-      study::read_study_trials(database, csv, protocol), settings, PALPATE_VERSION);
-  analysis::StudyRecord record;
-  if (!database.empty() && (values->count("report") || values->count("figures"))) {
-    record = analysis::read_study_record(database, protocol);
-  }
-  put(outputs, analysis, record);
+  const analysis::StudyAnalysis analysis =
+      analysis::analyze_study(std::move(study.table), functions, settings, PALPATE_VERSION);
+  put(outputs, analysis, study.record);
   outputs.write();
-  std::cout << analysis::report_text(analysis);
+  std::cout << analysis::study_text(analysis);
   return 0;
 }
 

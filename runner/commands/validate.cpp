@@ -11,6 +11,7 @@
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "protocols/schedule.h"
+#include "protocols/tasks/block_order.h"
 #include "protocols/tasks/texts.h"
 #include "runner/commands/shared/command.h"
 #include "runner/devices/device_delay.h"
@@ -139,7 +140,7 @@ void print_summary(const protocols::Protocol& protocol, std::ostream& out) {
     renderers.emplace_back(protocols::to_string(kind));
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli) stimuli.push_back(stimulus.name);
   constexpr std::array kOrders = {"in this order", "counterbalanced", "interleaved"};
-  const double rest = protocol.home.rest, time_out = protocol.response.time_out;
+  const double rest = protocol.home.rest, time_out = protocol.blocks.front().time_out;
   const double trial = std::min(kTypicalTrial, time_out);
   const auto n = static_cast<double>(trials.size());
 

@@ -273,7 +273,8 @@ void KeyboardRespondent::feedback(bool correct) {
 }
 
 void KeyboardRespondent::begin_trial(const protocols::Trial& trial) {
-  block_ = protocols::block_of(protocol_, trial);
+  const protocols::TaskBlock& block = protocols::block_of(protocol_, trial);
+  block_ = block.order == protocols::BlockOrder::shapes ? nullptr : &block;
   display::Page page;
   page.kind = display::Page::Kind::neutral;
   page.keys = keys_;

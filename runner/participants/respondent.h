@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "protocols/tasks/task_plan.h"
+#include "protocols/session_plan.h"
 #include "runner/servo/servo.h"
 
 namespace palpate::runner::participants {

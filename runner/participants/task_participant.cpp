@@ -63,6 +63,7 @@ constexpr int kMostIntervals = 64;       // trials of the hand within one of the
 /// Whether the observer of shapes can identify a block's stimuli.
 bool is_identified_by_shape(const protocols::Protocol& protocol,
                             const protocols::TaskBlock& block) {
+  if (block.order == protocols::BlockOrder::shapes) return true;
   if (block.task != protocols::TaskKind::identify || block.level) return false;
   for (std::size_t i = 0; i < block.stimuli.size(); ++i) {
     const auto object = [&](std::size_t k) -> const stimuli::ObjectSpec& {
@@ -114,7 +115,7 @@ bool differ_in_stiffness(const protocols::Protocol& protocol, const protocols::T
 }
 
 void LevelPercept::begin(const protocols::Trial& trial, const protocols::Interval& interval) {
-  const auto& block = *protocols::block_of(protocol_, trial);
+  const auto& block = protocols::block_of(protocol_, trial);
   orientation_ = trial.orientation;
   stiffness_sum_ = squares_ = products_ = 0;
   contact_ticks_ = 0;
@@ -185,7 +186,7 @@ void TaskJudgement::begin(const protocols::Trial& trial, const Random& random) {
   evidence_ = 0;
 }
 
-const TaskBlock& TaskJudgement::block() const { return *protocols::block_of(protocol_, trial_); }
+const TaskBlock& TaskJudgement::block() const { return protocols::block_of(protocol_, trial_); }
 
 double TaskJudgement::level_of(const protocols::Interval& interval) const {
   if (interval.level) return *interval.level;
@@ -406,7 +407,7 @@ TaskParticipant::TaskParticipant(const SimulatedSettings& own, const ShapeHypoth
 }
 
 const protocols::TaskBlock& TaskParticipant::block() const {
-  return *protocols::block_of(protocol_, trial_);
+  return protocols::block_of(protocol_, trial_);
 }
 
 void TaskParticipant::begin_trial(const protocols::Trial& trial) {

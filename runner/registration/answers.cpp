@@ -6,6 +6,7 @@
 
 #include "analysis/report/plan_report.h"
 #include "analysis/text.h"
+#include "protocols/schedule.h"
 #include "runner/registration/planned_conditions.h"
 
 namespace palpate::runner::registration {
@@ -87,7 +88,8 @@ std::string accuracy_in_words() {
 }
 
 std::unique_ptr<StudyAnswers> study_answers(const Registration& made) {
-  return made.protocol.blocks.empty() ? identification_answers(made) : task_answers(made);
+  return protocols::study_of_shapes(made.protocol) ? identification_answers(made)
+                                                   : task_answers(made);
 }
 
 }  // namespace palpate::runner::registration

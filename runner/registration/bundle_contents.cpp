@@ -12,8 +12,9 @@
 #include "analysis/figures/figures.h"
 #include "analysis/figures/svg.h"
 #include "analysis/input/csv_reader.h"
-#include "analysis/input/task_trials.h"
+#include "analysis/input/study_table.h"
 #include "analysis/input/trials.h"
+#include "analysis/report/study_report.h"
 #include "analysis/text.h"
 #include "data/base/checksum.h"
 #include "data/base/markdown.h"
@@ -21,6 +22,7 @@
 #include "data/files/utc.h"
 #include "data/stored_protocol.h"
 #include "protocols/json_document.h"
+#include "protocols/schedule.h"
 #include "runner/registration/about_file.h"
 #include "runner/registration/crate.h"
 #include "runner/registration/sealed_folder.h"
@@ -164,6 +166,7 @@ study::ShownTrial shown_trial(const TrialFields& of, std::size_t row, int sessio
              {of.number(row, "orientation_w"), of.number(row, "orientation_x"),
               of.number(row, "orientation_y"), of.number(row, "orientation_z")}};
   out.practice = of.flag(row, "practice");
+  out.outcome = {of.flag(row, "correct"), false, !of.flag(row, "timed_out"), std::nullopt};
   if (!of.has("task") || of.text(row, "block_name").empty()) return out;
   const std::string& comparison = of.text(row, "comparison_interval");
   out.row.task = {static_cast<int>(of.count(row, "block")),
@@ -172,8 +175,8 @@ study::ShownTrial shown_trial(const TrialFields& of, std::size_t row, int sessio
                   level_of(of, row),
                   of.flag(row, "catch_trial"),
                   comparison.empty() ? 0 : static_cast<int>(of.count(row, "comparison_interval"))};
-  out.outcome = {of.flag(row, "correct"), of.flag(row, "success"), !of.flag(row, "timed_out"),
-                 level_of(of, row)};
+  out.outcome.success = of.flag(row, "success");
+  out.outcome.level = level_of(of, row);
   return out;
 }
 
@@ -221,54 +224,55 @@ void put_without_trials(const Stated& stated, StudyData& study) {
 
 /// The study's own trials, with the shapes in the order of the protocol, as 'palpate check' has
 /// them. \param own_only  those of the protocols of the registered name
-study::StudyTable own_table(const std::string& folder, const StudyData& study, bool own_only,
-                            const Registration& registered, const analysis::StudyRecord& record) {
-  const std::string trials = (fs::path(folder) / kTrials).string();
-  if (!registered.protocol.blocks.empty())
-    return analysis::read_task_trials_csv(trials, own_only ? registered.protocol.name : "",
-                                          record.protocols);
-  std::vector<std::string> own, order;
+analysis::StudyTable own_table(const std::string& folder, const StudyData& study, bool own_only,
+                               const Registration& registered,
+                               const analysis::StudyRecord& record) {
+  std::vector<std::string> own;
+  std::vector<analysis::ProtocolText> protocols;
   for (const data::ProtocolInfo& one : study.protocols) {
     if (own_only && one.name != registered.protocol.name) continue;
     own.push_back(one.sha256);
-    for (const std::string& name : data::read_stored_protocol(one.text).stimuli) {
-      if (std::ranges::find(order, name) == order.end()) order.push_back(name);
-    }
+    const auto text =
+        std::ranges::find(record.protocols, one.sha256, &analysis::ProtocolText::sha256);
+    if (text != record.protocols.end()) protocols.push_back(*text);
   }
-  analysis::TrialTable table = analysis::read_trials_csv(trials, own);
-  analysis::order_shapes(table, order);
-  return table;
+  return analysis::read_study_csv((fs::path(folder) / kTrials).string(), own, protocols);
 }
 
-void judge_all(study::StudyTable table, const Registration& registered, StudyCheck& check) {
-  check.label = study::label_of(table);
+void judge_all(analysis::StudyTable table, const Registration& registered, StudyCheck& check) {
+  check.label = analysis::label_of(table);
   const analysis::NamedResults results = analysis::named_results(
-      study::json_of(study::analyze_study(std::move(table), registered.too_fast)),
+      analysis::study_json(study::analyze_study(std::move(table), registered.too_fast)),
       registered.alpha);
   for (const analysis::Hypothesis& one : registered.hypotheses)
     check.hypotheses.emplace_back(one, analysis::judge(one, results));
 }
 
-/// Whose trials are analysed: the registered protocol's, unless the study has none of its name.
-std::string protocol_of_tasks(const Registration& registered, const analysis::StudyRecord& record) {
+/// What a table of tasks needs beside itself, for the analysis as in a database.
+struct Design {
+  std::vector<analysis::ProtocolText> protocols;  ///< empty: a study of shapes needs none
+  /// Whose trials are analysed: the registered protocol's, unless the study has none of its name.
+  std::string protocol;
+};
+
+Design design_of(const Registration& registered, const analysis::StudyRecord& record) {
+  if (protocols::study_of_shapes(registered.protocol)) return {};
   const std::string& name = registered.protocol.name;
   const bool there = std::ranges::find(record.protocols, name, &analysis::ProtocolText::name) !=
                      record.protocols.end();
-  return there ? name : "";
+  return {record.protocols, there ? name : ""};
 }
 
 /// The analysis of the trials in a bundle as reproduce.sh makes it.
-study::StudyAnalysis analyze_bundle(const std::string& folder, const Registration& registered,
-                                    const analysis::StudyRecord& record) {
+analysis::StudyAnalysis analyze_bundle(const std::string& folder, const Registration& registered,
+                                       const analysis::StudyRecord& record) {
+  const Design design = design_of(registered, record);
   const std::string trials = (fs::path(folder) / kTrials).string();
-  if (!registered.protocol.blocks.empty()) {
-    analysis::TaskTable table = analysis::read_task_trials_csv(
-        trials, protocol_of_tasks(registered, record), record.protocols);
-    table.source = table.provenance.source = kTrials;
-    return study::analyze_study(std::move(table), registered.too_fast);
-  }
-  analysis::TrialTable table = analysis::read_trials_csv(trials);
-  table.provenance.source = kTrials;
+  std::vector<std::string> wanted;
+  if (!design.protocol.empty()) wanted.push_back(design.protocol);
+  analysis::StudyTable table = analysis::read_study_csv(trials, wanted, design.protocols);
+  table.source = table.provenance.source = kTrials;
+  if (table.times) table.times->provenance.source = kTrials;
   return study::analyze_study(std::move(table), registered.too_fast);
 }
 
@@ -276,11 +280,10 @@ study::StudyAnalysis analyze_bundle(const std::string& folder, const Registratio
 std::string as_option(double value) { return nlohmann::json(value).dump(); }
 
 std::string reproduce_script(const Registration& registered, const analysis::StudyRecord& record) {
-  std::string of_tasks;
-  if (!registered.protocol.blocks.empty()) {
-    const std::string name = protocol_of_tasks(registered, record);
-    of_tasks = " --design data/record.json" + (name.empty() ? "" : " --protocol " + name);
-  }
+  const Design design = design_of(registered, record);
+  std::string options = as_option(registered.too_fast);
+  if (!design.protocols.empty()) options += " --design data/record.json";
+  if (!design.protocol.empty()) options += " --protocol " + design.protocol;
   return R"sh(#!/bin/sh
 # Makes analysis.json again from data/trials.csv and compares the bytes.
 # Needs palpate )sh" PALPATE_VERSION
@@ -291,7 +294,7 @@ sha256sum --check --quiet SHA256SUMS
 scratch=$(mktemp -d)
 trap 'rm -r "$scratch"' EXIT
 "${PALPATE:-palpate}" analyze --csv data/trials.csv --too-fast-s )sh" +
-         as_option(registered.too_fast) + of_tasks + R"sh( \
+         options + R"sh( \
   --json "$scratch/analysis.json" > "$scratch/analysis.txt"
 cmp "$scratch/analysis.json" analysis.json
 echo "analysis.json is reproduced"
@@ -341,7 +344,8 @@ std::string readme(const BundleFacts& facts) {
       "| `report.html`, `figures/` | the analysis for reading |\n"
       "| `analysis.json` | every number of the analysis, made from "
       "`data/trials.csv` " +
-      std::string(protocol.blocks.empty() ? "alone" : "and the protocol in `data/record.json`") +
+      std::string(protocols::study_of_shapes(protocol) ? "alone"
+                                                       : "and the protocol in `data/record.json`") +
       " |\n"
       "| `about.json` | authors, license, funding |\n"
       "| `ro-crate-metadata.json` | this folder described for programs, "
@@ -512,13 +516,13 @@ BundleFacts bundle_facts(const std::string& folder, const std::vector<CheckPoint
 std::map<std::string, std::string> derived_files(const BundleFacts& facts) {
   const analysis::StudyRecord record = with_check(facts.record, facts.registered, facts.check);
   std::map<std::string, std::string> out = {
-      {"analysis.json", study::json_of(facts.analysis)},
+      {"analysis.json", analysis::study_json(facts.analysis)},
       {"check.json", check_json(facts.check, facts.registered)},
       {"check.html", check_html(facts.check, facts.registered)},
-      {"report.html", study::html_of(facts.analysis, record)},
+      {"report.html", analysis::study_html(facts.analysis, record)},
       {"README.md", readme(facts)},
       {"reproduce.sh", reproduce_script(facts.registered, facts.record)}};
-  for (const analysis::Figure& figure : study::figures_of(facts.analysis, record))
+  for (const analysis::Figure& figure : analysis::study_figures(facts.analysis, record))
     out["figures/" + figure.id + ".svg"] = analysis::figure_svg(figure, analysis::light_palette());
   return out;
 }

@@ -12,7 +12,7 @@
 #include "data/export/study_about.h"
 #include "runner/registration/deviations.h"
 #include "runner/registration/registration.h"
-#include "runner/study/study_analysis.h"
+#include "runner/study/study_trials.h"
 
 namespace palpate::runner::registration {
 
@@ -47,7 +47,7 @@ struct BundleFacts {
   data::StudyAbout about;
   std::string format;  ///< "psych-ds", "bids"
   TextTable trials;
-  study::StudyAnalysis analysis;
+  analysis::StudyAnalysis analysis;
   analysis::StudyRecord record;
   StudyCheck check;
 };

@@ -9,6 +9,7 @@
 #include <variant>
 
 #include "analysis/input/trials.h"
+#include "analysis/report/study_report.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/text.h"
 #include "data/base/json_text.h"
@@ -17,13 +18,14 @@
 #include "data/store/task_text.h"
 #include "protocols/difference.h"
 #include "protocols/json_document.h"
+#include "protocols/tasks/block_order.h"
 #include "runner/build_info.h"
 #include "runner/participants/simulated_settings.h"
 #include "runner/registration/registration_text.h"
 #include "runner/registration/sealed_folder.h"
-#include "runner/session/session_plan.h"
-#include "runner/study/study_analysis.h"
+#include "runner/session/recorded_outcome.h"
 #include "runner/study/study_order.h"
+#include "runner/study/study_trials.h"
 #include "runner/usage_error.h"
 
 namespace palpate::runner::registration {
@@ -271,7 +273,7 @@ using OrderCounts = std::map<std::string, std::size_t>;
 /// Empty where the order is not counterbalanced.
 OrderCounts registered_orders(const Registration& registered) {
   OrderCounts out;
-  const auto repeat = static_cast<std::size_t>(study::condition_orders(registered.protocol));
+  const auto repeat = static_cast<std::size_t>(protocols::block_orders(registered.protocol));
   if (repeat < 2) return out;
   for (std::size_t i = 0; i < std::min(repeat, registered.participants); ++i)
     out[study::condition_order(registered.protocol, static_cast<int>(i) + 1)] +=
@@ -292,8 +294,8 @@ std::string orders_text(const Registration& statement, const StudyData& study) {
   for (const auto& [order, n] : registered)
     out += (out.empty() ? "" : "; ") + printable(order) + ": " + std::to_string(shown[order]) +
            " (" + std::to_string(n) + " registered)";
-  return std::string("Order of the ") +
-         (statement.protocol.blocks.empty() ? "renderers" : "blocks") + ": " + out + ".";
+  return std::string("Order of the ") + study::conditions_in_words(statement.protocol) + ": " +
+         out + ".";
 }
 
 /// Who began a session and completed no trial, each once.
@@ -444,7 +446,7 @@ CheckPoint of_exclusion(const Registration& registered, const ReportedAnalysis& 
   CheckPoint out{"exclusion", "Exclusion of times", Finding::as_registered,
                  "Correct answers faster than " + seconds(registered.too_fast) +
                      " are left out of the times, as registered."};
-  if (!registered.protocol.blocks.empty() && registered.typical_time == 0)
+  if (registered.typical_time == 0)
     out.sentence = "Nothing is identified: there are no times to leave out.";
   const double used = reported.too_fast.value_or(registered.too_fast);
   if (used == registered.too_fast) return out;
@@ -542,13 +544,13 @@ std::vector<std::string> shapes_of(const std::string& analysis_json) {
 }
 
 /// Compares the numbers of an analysis as reported with those of the registered analysis.
-CheckPoint of_reported(study::StudyTable table, const ReportedAnalysis& reported, double too_fast) {
+CheckPoint of_reported(analysis::StudyTable table, const ReportedAnalysis& reported,
+                       double too_fast) {
   CheckPoint out{"analysis", "Reported numbers", Finding::as_registered,
                  "Every number of the reported analysis is that of these data."};
-  if (auto* const times = std::get_if<analysis::TrialTable>(&table))
-    analysis::order_shapes(*times, shapes_of(reported.json));
-  const analysis::NamedResults ours =
-      analysis::named_results(study::json_of(study::analyze_study(std::move(table), too_fast)), 0);
+  if (table.times) analysis::order_shapes(*table.times, shapes_of(reported.json));
+  const analysis::NamedResults ours = analysis::named_results(
+      analysis::study_json(study::analyze_study(std::move(table), too_fast)), 0);
   const analysis::NamedResults theirs = analysis::named_results(reported.json, 0);
   const auto text = [](const analysis::NamedResults& of, const std::string& name) {
     const auto found = of.find(name);
@@ -624,7 +626,7 @@ ReportedAnalysis read_reported(const std::string& text, const std::string& file)
         read_object(*value, reader.pointer(key));
     }
   }
-  if (of_tasks && json.contains(nlohmann::json::json_pointer("/identification/settings")))
+  if (json.contains(nlohmann::json::json_pointer("/identification/settings")))
     read_object(json["identification"]["settings"], "/identification/settings");
   if (!faults.empty())
     faults.add("", "expected what 'palpate analyze --json' wrote for this study");
@@ -656,12 +658,12 @@ StudyCheck check_study(const Registration& registered, const std::string& folder
                      " withdrawn and must not be used; remove with 'palpate forget' first");
   const CheckPoint protocol = of_protocol(registered, study);
   const std::string name = keep_study_named(registered.protocol.name, study);
-  const study::StudyTable table = study::read_study_table(database, name);
+  const analysis::StudyTable table = study::read_study(store, name).table;
   const analysis::NamedResults results = analysis::named_results(
-      study::json_of(study::analyze_study(table, registered.too_fast)), registered.alpha);
+      analysis::study_json(study::analyze_study(table, registered.too_fast)), registered.alpha);
 
   StudyCheck out;
-  out.label = study::label_of(table);
+  out.label = analysis::label_of(table);
   out.participants = study.participants.size();
   out.removed = study.removed;
   out.without_trials = people_without_trials(study);

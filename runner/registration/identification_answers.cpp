@@ -33,7 +33,7 @@ class IdentificationAnswers final : public StudyAnswers {
   }
 
   std::string feedback() const override {
-    return protocol_.response.feedback
+    return protocol_.blocks.front().feedback
                ? "After each answer the participant's window says whether it was right."
                : "";
   }
@@ -58,7 +58,8 @@ class IdentificationAnswers final : public StudyAnswers {
           "Warm-up: " +
           counted(static_cast<std::size_t>(protocol_.sessions.warm_up_trials), "trial", "trials") +
           " at the start of the second and later sessions; not analysed."));
-    out.push_back(item("An answer is given by a key within " + plain(protocol_.response.time_out) +
+    out.push_back(item("An answer is given by a key within " +
+                       plain(protocol_.blocks.front().time_out) +
                        " s; a trial without one is a time-out."));
     out.push_back(
         text("The protocol, protocol.json, says all of it for the program that runs the "
@@ -176,7 +177,7 @@ class IdentificationAnswers final : public StudyAnswers {
   std::vector<Paragraph> missing() const override {
     return {item("A time-out counts as wrong and has no time in the primary test; a log-normal "
                  "model with time-outs as censored times (at " +
-                 plain(protocol_.response.time_out) + " s) is reported beside it."),
+                 plain(protocol_.blocks.front().time_out) + " s) is reported beside it."),
             item("A participant without a time in a cell is left out of that shape's paired test."),
             item("Of participants who withdraw, all data are deleted.")};
   }

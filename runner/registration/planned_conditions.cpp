@@ -9,8 +9,8 @@
 #include "analysis/text.h"
 #include "data/base/text.h"
 #include "protocols/procedures/procedure.h"
+#include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
-#include "protocols/tasks/task_plan.h"
 #include "runner/usage_error.h"
 
 namespace palpate::runner::registration {
@@ -63,8 +63,6 @@ std::size_t trials_of(const TaskBlock& block) {
 /// Identification: trials with a renderer, of one shape or of all.
 std::size_t trials_of_identification(const Protocol& protocol, const std::vector<int>& blocks,
                                      bool of_one_shape) {
-  const auto shapes = of_one_shape ? std::size_t{1} : protocol.stimuli.size();
-  if (protocol.blocks.empty()) return static_cast<std::size_t>(protocol.repetitions) * shapes;
   std::size_t trials = 0;
   const auto kind = protocol.blocks[static_cast<std::size_t>(blocks.front())].renderers.front();
   for (const int index : blocks) {
@@ -86,21 +84,14 @@ std::string option_of(const std::string& measure) {
 void require_measure(const analysis::PlanRecord& plan, const std::string& path,
                      const Protocol& protocol) {
   const std::string measure = name_of_measure(plan);
-  if (protocol.blocks.empty()) {
-    if (is_of_identification(plan)) return;
-    throw UsageError(printable(path) + ": /model/measure: expected a plan of times or accuracy " +
-                     "(palpate plan --effect, --accuracy-effect), for shapes are identified; this "
-                     "one is of " +
-                     measure);
-  }
   if (!conditions_of(protocol, plan).blocks.empty()) return;
   std::string blocks;
   std::set<std::string> options;
   for (const TaskBlock& block : protocol.blocks) {
     if (block.practice) continue;
     const std::vector<std::string> names = measures_of(protocol, block);
-    blocks +=
-        (blocks.empty() ? "" : "; ") + ("block '" + block.name + "': ") + analysis::joined(names);
+    blocks += (blocks.empty() ? "" : "; ") +
+              (block.name.empty() ? "" : "block '" + block.name + "': ") + analysis::joined(names);
     for (const std::string& name : names) options.insert(option_of(name));
   }
   std::string words;
@@ -113,9 +104,6 @@ void require_measure(const analysis::PlanRecord& plan, const std::string& path,
 /// The stimuli that are identified.
 std::vector<std::string> identified(const Protocol& protocol, const std::vector<int>& blocks) {
   std::set<std::string> names;
-  if (protocol.blocks.empty()) {
-    for (const protocols::StimulusSpec& one : protocol.stimuli) names.insert(one.name);
-  }
   for (const int index : blocks) {
     for (const int stimulus : protocol.blocks[static_cast<std::size_t>(index)].stimuli)
       names.insert(protocol.stimuli[static_cast<std::size_t>(stimulus)].name);

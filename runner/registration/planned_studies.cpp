@@ -8,9 +8,10 @@
 #include <mutex>
 #include <utility>
 
-#include "analysis/input/task_trials.h"
+#include "analysis/input/study_table.h"
 #include "analysis/input/trials.h"
 #include "analysis/report/report.h"
+#include "analysis/report/study_report.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/jobs.h"
 #include "analysis/statistics/power.h"
@@ -141,9 +142,9 @@ std::vector<PlannedTimes::Outcome> PlannedTimes::outcomes(std::size_t participan
     one.time = drawn[i].time;
     one.answer = (shape + drawn[i].other) % shapes_.size();
     one.timed_out =
-        one.time >= protocol_.response.time_out || (!drawn[i].usable && one.answer == shape);
+        one.time >= protocol_.blocks.front().time_out || (!drawn[i].usable && one.answer == shape);
     one.correct = !one.timed_out && one.answer == shape;
-    if (one.timed_out) one.time = protocol_.response.time_out;
+    if (one.timed_out) one.time = protocol_.blocks.front().time_out;
   }
   return out;
 }
@@ -277,7 +278,7 @@ class PlannedTasks final : public PlannedStudies {
                                              Random& trials) const;
   participants::JudgementSettings of_times(const analysis::StudyModel& model,
                                            const protocols::Trial& trial, Random& person) const;
-  std::string analyzed(analysis::TaskTable table, int simulations) const;
+  std::string analyzed(analysis::StudyTable table, int simulations) const;
 
   const Registration& made_;
   protocols::Protocol protocol_;  ///< fit for the simulated device, without samples
@@ -298,7 +299,7 @@ participants::JudgementSettings PlannedTasks::of_measure(const ThresholdStudy& s
                                                          const protocols::Trial& trial,
                                                          Random& person, Random& trials) const {
   constexpr double kQuartile = 0.6744897501960817;  // of the normal distribution
-  const protocols::TaskBlock& block = *protocols::block_of(protocol_, trial);
+  const protocols::TaskBlock& block = protocols::block_of(protocol_, trial);
   // The same draws in every trial of a participant.
   const double level = study.participant_sd * person.normal();
   const double own = study.effect_sd * person.normal();
@@ -407,26 +408,25 @@ void PlannedTasks::write(const std::string& folder, const std::string& csv,
   data::export_csv(store, csv, settings);
 }
 
-std::string PlannedTasks::analyzed(analysis::TaskTable table, int simulations) const {
+std::string PlannedTasks::analyzed(analysis::StudyTable table, int simulations) const {
   analysis::FunctionSettings functions;
   functions.simulations = simulations;
   analysis::AnalysisSettings settings;
   settings.too_fast = made_.too_fast;
-  return analysis::task_report_json(
-      analysis::analyze_tasks(std::move(table), functions, settings, PALPATE_VERSION),
-      PALPATE_VERSION);
+  return analysis::study_json(
+      analysis::analyze_study(std::move(table), functions, settings, PALPATE_VERSION));
 }
 
 std::string PlannedTasks::analyzed(const std::string& csv, const std::string& name) {
   const protocols::Protocol& protocol = made_.protocol;
-  analysis::TaskTable table = analysis::read_task_trials_csv(
-      csv, "", {{protocol.name, protocol.sha256, protocol.source_text, "", ""}});
+  analysis::StudyTable table = analysis::read_study_csv(
+      csv, {}, {{protocol.name, protocol.sha256, protocol.source_text, "", ""}});
   table.source = table.provenance.source = name;
   return analyzed(std::move(table), analysis::FunctionSettings{}.simulations);
 }
 
 std::string PlannedTasks::analyzed(std::size_t study, bool with_effect) const {
-  analysis::TaskTable table;
+  analysis::StudyTable table;
   table.simulated = true;
   table.protocols = {{made_.protocol.name, made_.protocol.sha256}};
   table.procedures[made_.protocol.sha256] =
@@ -436,8 +436,8 @@ std::string PlannedTasks::analyzed(std::size_t study, bool with_effect) const {
       protocol_, settings_, static_cast<int>(made_.participants), made_.seed + study, {},
       [&](int number, const data::TrialRecord& record, std::uint64_t) {
         if (record.practice) return;
-        analysis::TaskTrial& trial = table.trials.emplace_back(
-            analysis::task_trial_of(session::simulated_code(number), record));
+        analysis::StudyTrial& trial = table.trials.emplace_back(
+            analysis::study_trial_of(session::simulated_code(number), record));
         trial.protocol_sha256 = made_.protocol.sha256;
         trial.participant_number = number;
         trial.simulated = true;
@@ -449,16 +449,15 @@ std::string PlannedTasks::analyzed(std::size_t study, bool with_effect) const {
 }  // namespace
 
 std::unique_ptr<PlannedStudies> planned_studies(const Registration& made) {
-  if (made.protocol.blocks.empty()) return std::make_unique<PlannedTimes>(made);
+  if (protocols::study_of_shapes(made.protocol)) return std::make_unique<PlannedTimes>(made);
   return std::make_unique<PlannedTasks>(made);
 }
 
 std::size_t usual_studies(const protocols::Protocol& protocol) {
-  return protocol.blocks.empty() ? 200 : 20;
+  return protocols::study_of_shapes(protocol) ? 200 : 20;
 }
 
 double typical_time(const protocols::Protocol& protocol, double too_fast) {
-  if (protocol.blocks.empty()) return std::sqrt(too_fast * protocol.response.time_out);
   for (const protocols::TaskBlock& block : protocol.blocks) {
     if (block.task == protocols::TaskKind::identify && !block.practice)
       return std::sqrt(too_fast * block.time_out);

@@ -7,8 +7,8 @@
 #include "analysis/report/plan_report.h"
 #include "analysis/statistics/paired.h"
 #include "analysis/text.h"
+#include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
-#include "protocols/tasks/task_plan.h"
 #include "runner/registration/answers.h"
 #include "runner/registration/planned_conditions.h"
 #include "runner/study/study_order.h"
@@ -468,7 +468,7 @@ class TaskAnswers final : public StudyAnswers {
 
   std::string order_of_blocks() const {
     if (blocks_.size() == 1) return "there is one.";
-    const int orders = study::condition_orders(protocol_);
+    const int orders = protocols::block_orders(protocol_);
     if (orders < 2) return "the same for everybody: " + study::condition_order(protocol_, 1) + ".";
     return "counterbalanced over participant numbers within a session (balanced Latin square; it "
            "repeats after " +

@@ -9,7 +9,7 @@
 #include "data/base/text.h"
 #include "protocols/json_document.h"
 #include "runner/safety/fault_signals.h"
-#include "runner/session/session_plan.h"
+#include "runner/session/session_scenes.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::runner::serve {
@@ -116,7 +116,7 @@ ordered_json ServedSession::next_trial() const {
   ordered_json out = {{"trial", trial.trial}, {"block", trial.block}, {"practice", trial.practice}};
   const auto& stimuli = parts_.station.protocol.stimuli;
   const auto name = [&](int i) { return stimuli[static_cast<std::size_t>(i)].name; };
-  if (trial.task_block >= 0) {
+  if (!block.name.empty()) {
     out["task"] = to_string(block.task);
     out["block_name"] = block.name;
   }

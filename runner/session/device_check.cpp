@@ -10,6 +10,7 @@
 
 #include "data/base/json_text.h"
 #include "data/files/utc.h"
+#include "protocols/schedule.h"
 #include "protocols/tasks/levels.h"
 
 namespace palpate::runner::session {
@@ -505,13 +506,13 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
                                             felt_gain(protocol), protocol.passivity_controller);
       if (device.actuated_freedom == 0 || can.reason.empty()) return;
       refused = true;
-      faults.add(
-          stimulus.name, StimulusFaults::Check::material,
-          sentence(" has ", of_parts, can.reason, ": soften /material, raise ", "/servo/rate_hz, ",
-                   protocol.reach ? "lessen /reach/factor, " : "",
-                   passivity_advice(protocol, material, device, can),
-                   protocol.blocks.empty() ? "or have it limited by /servo/material_limit \"limit\""
-                                           : "or keep the levels below"));
+      faults.add(stimulus.name, StimulusFaults::Check::material,
+                 sentence(" has ", of_parts, can.reason, ": soften /material, raise ",
+                          "/servo/rate_hz, ", protocol.reach ? "lessen /reach/factor, " : "",
+                          passivity_advice(protocol, material, device, can),
+                          protocols::study_of_shapes(protocol)
+                              ? "or have it limited by /servo/material_limit \"limit\""
+                              : "or keep the levels below"));
     };
     visit_materials(stimulus.object,
                     [&](const stimuli::Material& material) { check_material(material, ""); });

@@ -6,8 +6,6 @@
 #include <utility>
 #include <vector>
 
-#include "runner/session/session_plan.h"
-
 namespace palpate::runner::session {
 namespace {
 

@@ -13,11 +13,12 @@
 #include <utility>
 
 #include "protocols/parse.h"
+#include "protocols/session_plan.h"
 #include "runner/scene_builder.h"
 #include "runner/servo/servo.h"
 #include "runner/session/device_check.h"
 #include "runner/session/run_record.h"
-#include "runner/session/session_plan.h"
+#include "runner/session/session_scenes.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::runner::session {
@@ -165,11 +166,11 @@ protocols::Trial trial_of(const protocols::Protocol& protocol, const data::Trial
   const auto& q = recorded.orientation_wxyz;
   trial.orientation = Quat(q[0], q[1], q[2], q[3]);
   trial.stimulus = stimulus_named(protocol, recorded.shape);
-  for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
-    if (protocol.blocks[i].name == recorded.task.block_name) trial.task_block = static_cast<int>(i);
-  }
-  if (recorded.task.of_block() && trial.task_block < 0)
+  const auto block =
+      std::ranges::find(protocol.blocks, recorded.task.block_name, &protocols::TaskBlock::name);
+  if (block == protocol.blocks.end())
     throw std::invalid_argument("the protocol has no block named " + recorded.task.block_name);
+  trial.task_block = static_cast<int>(block - protocol.blocks.begin());
   return trial;
 }
 

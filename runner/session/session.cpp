@@ -9,8 +9,10 @@
 
 #include "data/base/checksum.h"
 #include "data/files/utc.h"
+#include "protocols/schedule.h"
+#include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
-#include "protocols/tasks/task_plan.h"
+#include "runner/session/recorded_outcome.h"
 #include "runner/session/run_record.h"
 
 namespace palpate::runner::session {
@@ -92,8 +94,7 @@ std::array<double, 3> values(const Vec3& v) { return {v.x, v.y, v.z}; }
 }  // namespace
 
 const protocols::TaskBlock& Session::task_of(const protocols::Trial& trial) const {
-  const protocols::TaskBlock* const block = block_of(station_.protocol, trial);
-  return block == nullptr ? identification_ : *block;
+  return block_of(station_.protocol, trial);
 }
 
 void Session::plan_task(const protocols::Trial& trial, data::TrialRecord& record) const {
@@ -132,7 +133,7 @@ servo::HomeZone Session::home_of(const protocols::Interval& interval, double res
 }
 
 void Session::tell_interval(const protocols::Trial& trial, const participants::IntervalView& view) {
-  if (trial.task_block < 0) return;
+  if (task_of(trial).order == protocols::BlockOrder::shapes) return;
   if (events_ != nullptr) events_->interval(trial, view);
   participant_.begin_interval(trial, view);
 }
@@ -328,20 +329,19 @@ void Session::tell_level() {
 }
 
 void Session::begin_task_block() {
-  const protocols::TaskBlock* const block = station_.plan.next_block();
-  if (block == nullptr) return;
-  show_pages(PageSpec::When::between, block->name);
-  read_instructions(*block);
+  const protocols::TaskBlock& block = station_.plan.block();
+  show_pages(PageSpec::When::between, block.name);
+  read_instructions(block);
 }
 
 void Session::read_instructions(const protocols::TaskBlock& block) {
+  if (block.instructions.empty()) return;
   participant_.read_screens(screens_of(block.instructions));
 }
 
 /// Shows the block's instructions again when a session resumes within a block.
 void Session::resume_task_block() {
-  const protocols::TaskBlock* const block = station_.plan.next_block();
-  if (block != nullptr && !station_.plan.block_begins()) read_instructions(*block);
+  if (!station_.plan.block_begins()) read_instructions(station_.plan.block());
 }
 
 bool Session::has_open_pages() const {
@@ -408,9 +408,8 @@ Session::Session(const Station& station, participants::Respondent& participant,
       participant_(participant),
       events_(events),
       least_reach_(least_reach),
-      identification_(identification_block(station.protocol)),
       scenes_(station.protocol, &station.library) {
-  if (station.protocol.blocks.empty()) return;
+  if (protocols::study_of_shapes(station.protocol)) return;
   least_reach_ = std::max(least_reach, largest_reach(station));  // the same for every level
 }
 
@@ -477,8 +476,8 @@ void Session::step() {
 }
 
 void Session::tell_feedback() {
-  const bool feedback =
-      task_of(station_.plan.next()).feedback || (record_.practice && !record_.task.of_block());
+  const protocols::TaskBlock& block = station_.plan.block();
+  const bool feedback = block.feedback || (record_.practice && block.practice_feedback);
   station_.plan.answered(
       outcome_of(record_));  // first: a participant who leaves during the feedback has answered
   if (feedback && data::has_right_answer(record_)) participant_.feedback(record_.correct);

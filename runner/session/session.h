@@ -6,11 +6,12 @@
 #include <string>
 
 #include "data/record.h"
+#include "protocols/session_plan.h"
 #include "runner/participants/respondent.h"
 #include "runner/session/live_forces.h"
 #include "runner/session/session_end.h"
 #include "runner/session/session_events.h"
-#include "runner/session/session_plan.h"
+#include "runner/session/session_scenes.h"
 #include "runner/session/station.h"
 
 namespace palpate::runner::session {
@@ -35,7 +36,7 @@ class Session {
           SessionEvents* events = nullptr, double least_reach = 0);
 
   State state() const { return state_; }
-  const SessionPlan& plan() const { return station_.plan; }
+  const protocols::SessionPlan& plan() const { return station_.plan; }
   /// What a trial asks.
   const protocols::TaskBlock& task_of(const protocols::Trial& trial) const;
   /// Whether a page after the last trial still needs answers.
@@ -97,10 +98,9 @@ class Session {
   SessionEvents* events_;
   double least_reach_;
   State state_ = State::instruction;
-  data::TrialRecord record_;             ///< of the trial under way
-  ContactLog contact_;                   ///< likewise
-  servo::ServoQuality quality_;          ///< likewise, of its intervals so far
-  protocols::TaskBlock identification_;  ///< of each trial without a block
+  data::TrialRecord record_;     ///< of the trial under way
+  ContactLog contact_;           ///< likewise
+  servo::ServoQuality quality_;  ///< likewise, of its intervals so far
   SessionScenes scenes_;
   int asked_trial_ = 0;  ///< the last trial for which an advisor was asked
 };

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "protocols/tasks/levels.h"
-#include "runner/session/session_plan.h"
+#include "runner/session/session_scenes.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::runner::session {
@@ -39,10 +39,9 @@ const char* in_words(Session::State state) {
 
 /// Whether answers judge the stimulus; a standard is felt only.
 bool is_asked_for(const protocols::Protocol& protocol, int stimulus) {
-  return protocol.blocks.empty() ||
-         std::ranges::any_of(protocol.blocks, [&](const protocols::TaskBlock& block) {
-           return std::ranges::find(block.stimuli, stimulus) != block.stimuli.end();
-         });
+  return std::ranges::any_of(protocol.blocks, [&](const protocols::TaskBlock& block) {
+    return std::ranges::find(block.stimuli, stimulus) != block.stimuli.end();
+  });
 }
 
 bool has_right_answers(const protocols::TaskBlock& block) {
@@ -65,8 +64,7 @@ SessionMonitor::SessionMonitor(const LiveStation& station, const Sources& source
     if (is_asked_for(station.protocol, static_cast<int>(i)))
       state_.scores.push_back({station.protocol.stimuli[i].name, 0, 0});
   }
-  state_.counts_right = station.protocol.blocks.empty() ||
-                        std::ranges::any_of(station.protocol.blocks, has_right_answers);
+  state_.counts_right = std::ranges::any_of(station.protocol.blocks, has_right_answers);
   state_.takes_answers = station.answer_by == participants::AnswerBy::experimenter;
   show_answers();
 }
@@ -98,7 +96,7 @@ void SessionMonitor::say(const std::string& message) {
 void SessionMonitor::show() {
   shown_ns_ = station_.clock.now_ns();
   const Session& session = sources_.session;
-  const SessionPlan& plan = session.plan();
+  const protocols::SessionPlan& plan = session.plan();
   state_.seconds_left = sources_.respondent.seconds_left();
   state_.elapsed = static_cast<double>(shown_ns_ - started_ns_) / kSecond_ns;
   const std::size_t expected = expected_trials();
@@ -109,7 +107,7 @@ void SessionMonitor::show() {
     if (!plan.finished()) state_.block = plan.next().block;
   }
   state_.pauses = in_trial_ && sources_.hold.kind() == SessionHold::Kind::pause;
-  state_.blocks = plan.blocks();
+  state_.blocks = plan.last_block();
   state_.remaining = seconds_per_trial_ * static_cast<double>(expected - plan.done());
   state_.sample = sources_.forces.newest();
   state_.bodies.clear();
@@ -133,7 +131,7 @@ void SessionMonitor::show() {
 }
 
 std::size_t SessionMonitor::expected_trials() {
-  const SessionPlan& plan = sources_.session.plan();
+  const protocols::SessionPlan& plan = sources_.session.plan();
   if (expected_at_ != plan.done()) {
     expected_at_ = plan.done();
     expected_ = plan.expected_size();
@@ -163,7 +161,7 @@ void SessionMonitor::count(const data::TrialRecord& record) {
 
 void SessionMonitor::interval(const protocols::Trial& trial,
                               const participants::IntervalView& view) {
-  const auto& block = *protocols::block_of(station_.protocol, trial);
+  const auto& block = protocols::block_of(station_.protocol, trial);
   sources_.signals.interval(view.continues);
   feeling_ = feeling_ && view.continues;
   state_.task = to_string(block.task);

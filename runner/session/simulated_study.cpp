@@ -15,9 +15,12 @@
 #include <utility>
 
 #include "protocols/difference.h"
+#include "protocols/schedule.h"
+#include "protocols/tasks/block_order.h"
 #include "runner/build_info.h"
 #include "runner/participants/simulated.h"
 #include "runner/session/device_check.h"
+#include "runner/session/recorded_outcome.h"
 #include "runner/session/run_record.h"
 #include "runner/session/session.h"
 #include "runner/session/socket_advisor.h"
@@ -151,8 +154,8 @@ class QueueLog final : public TrialLog {
   std::vector<data::PageAnswer> given_;
 };
 
-SessionPlan plan_of(const protocols::Protocol& protocol, const Work& work) {
-  SessionPlan plan(protocol, work.participant.enrolled_number, work.session);
+protocols::SessionPlan plan_of(const protocols::Protocol& protocol, const Work& work) {
+  protocols::SessionPlan plan(protocol, work.participant.enrolled_number, work.session);
   for (const protocols::TrialOutcome& outcome : work.answers) plan.answered(outcome);
   return plan;
 }
@@ -211,7 +214,7 @@ std::vector<Work> unfinished_work(const protocols::Protocol& protocol, data::Sto
       work.clock_ns = before.latest_ns;
       work.info = simulated_run(protocol, settings, number, session);
       if (!protocol.pages.empty()) work.page_answers = store.answers_in_force(participant, session);
-      const SessionPlan trials = plan_of(protocol, work);
+      const protocols::SessionPlan trials = plan_of(protocol, work);
       progress.recorded += static_cast<std::int64_t>(trials.done());
       progress.expected += static_cast<std::int64_t>(trials.size());
       if (!trials.finished()) todo.push_back(std::move(work));
@@ -227,7 +230,6 @@ class Recorder {
            std::string event)
       : store_(store), work_(work), event_(std::move(event)) {
     for (const Work& w : work_) plans_.push_back(plan_of(protocol, w));
-    has_pages_ = !protocol.blocks.empty();
   }
 
   void record(std::deque<std::pair<std::size_t, data::TrialRecord>>&& came,
@@ -237,7 +239,7 @@ class Recorder {
     for (auto& [index, records] : by_work) {
       const data::Run& run = run_of(index);
       store_.record_simulated(run, records);
-      SessionPlan& plan = plans_[index];
+      protocols::SessionPlan& plan = plans_[index];
       for (const data::TrialRecord& record : records) {
         StudyProgress::Answers& answers = progress.by_block[record.task.block_name];
         ++answers.trials;
@@ -257,9 +259,9 @@ class Recorder {
         finished_.push_back(index);
       }
     }
-    if (!has_pages_) end_finished();
   }
-  /// Call after the trials of the same time: pages after the last trial belong to its run, too.
+  /// Call after the trials of the same time: pages and notes after the last trial belong to its
+  /// run, too.
   void record(const std::deque<std::pair<std::size_t, std::vector<data::PageAnswer>>>& pages) {
     for (const auto& [index, answers] : pages) store_.add_page_answers(run_of(index), answers);
   }
@@ -292,9 +294,8 @@ class Recorder {
   data::Store& store_;
   std::vector<Work>& work_;
   std::vector<std::size_t> finished_;
-  bool has_pages_ = false;  ///< or notes, which may come after the last trial
   const std::string event_;
-  std::vector<SessionPlan> plans_;
+  std::vector<protocols::SessionPlan> plans_;
   std::map<std::size_t, data::Run> runs_;
 };
 
@@ -311,8 +312,9 @@ SimulatedStudy::SimulatedStudy(const protocols::Protocol& p,
     : protocol(p),
       settings(s),
       library(p),
-      hypotheses(shapes_of(checked(p, library, s))),
-      of_blocks(participants::block_hypotheses(p)),
+      // Two equal shapes are never told apart, so the observer continues to perceive.
+      hypotheses({stimuli::ObjectSpec{}, stimuli::ObjectSpec{}}),
+      of_blocks(participants::block_hypotheses(checked(p, library, s))),
       seed(seed_) {}
 
 void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& session,
@@ -327,13 +329,14 @@ void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& 
                      workspace_of(protocol));
   if (protocol.passivity_controller) servo.control_passivity();
   std::unique_ptr<participants::Respondent> participant;
-  if (!protocol.blocks.empty()) {
+  if (const std::optional<int> shapes = protocols::study_of_shapes(protocol)) {
+    participant = std::make_unique<participants::SimulatedParticipant>(
+        own, *study.of_blocks[static_cast<std::size_t>(*shapes)], stylus, protocol, study.seed,
+        session.participant);
+  } else {
     participant = std::make_unique<participants::TaskParticipant>(
         own, study.hypotheses, study.of_blocks, stylus, protocol, study.seed, session.participant,
         study.planned);
-  } else {
-    participant = std::make_unique<participants::SimulatedParticipant>(
-        own, study.hypotheses, stylus, protocol, study.seed, session.participant);
   }
   const Station station{protocol, study.library, session.plan, servo,
                         clock,    session.utc,   log,          session.advisor};
@@ -378,23 +381,13 @@ bool simulate_in_memory(
         visit(number, record, static_cast<std::uint64_t>(std::llround(ticks)));
       });
       run_simulated_session(study,
-                            {number, SessionPlan(protocol, number, session), 0,
+                            {number, protocols::SessionPlan(protocol, number, session), 0,
                              simulated_run(protocol, settings, number, session).clock},
                             log, [&stop] { return stop.load(); });
       if (stop) return false;
     }
   }
   return true;
-}
-
-std::vector<stimuli::ObjectSpec> shapes_of(const protocols::Protocol& protocol) {
-  std::vector<stimuli::ObjectSpec> shapes;
-  // Blocks of tasks do not ask for the shape. Any shape serves for exploring; two equal shapes are
-  // never told apart, so the observer continues to perceive.
-  if (!protocol.blocks.empty()) return {stimuli::ObjectSpec{}, stimuli::ObjectSpec{}};
-  for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
-    shapes.push_back(stimulus.object);
-  return shapes;
 }
 
 LimitedForSimulation limit_for_simulation(protocols::Protocol& protocol,
@@ -417,10 +410,11 @@ std::vector<std::string> simulation_faults(const protocols::Protocol& protocol,
     faults.emplace_back(
         "another program chooses the stimuli of the task 'external': palpate serve runs it");
   }
-  const std::vector<stimuli::ObjectSpec> shapes = shapes_of(protocol);
-  for (std::size_t i = 0; i < shapes.size(); ++i) {
-    const std::string fault = participants::ShapeHypotheses::fault_of(shapes[i]);
-    if (!fault.empty()) faults.push_back("stimulus '" + protocol.stimuli[i].name + "': " + fault);
+  if (protocols::study_of_shapes(protocol)) {
+    for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
+      const std::string fault = participants::ShapeHypotheses::fault_of(stimulus.object);
+      if (!fault.empty()) faults.push_back("stimulus '" + stimulus.name + "': " + fault);
+    }
   }
   try {  // patched settings may be invalid
     const participants::ShapeHypotheses hypotheses({stimuli::ObjectSpec{}});

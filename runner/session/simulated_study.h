@@ -12,12 +12,12 @@
 #include "data/record.h"
 #include "data/store/store.h"
 #include "protocols/protocol.h"
+#include "protocols/session_plan.h"
 #include "runner/participants/simulated.h"
 #include "runner/participants/simulated_settings.h"
 #include "runner/participants/task_participant.h"
 #include "runner/scene_builder.h"
 #include "runner/session/run_record.h"
-#include "runner/session/session_plan.h"
 #include "runner/session/socket_advisor.h"
 
 namespace palpate::runner::session {
@@ -36,15 +36,16 @@ struct SimulatedStudy {
   const protocols::Protocol& protocol;
   const participants::SimulatedSettings& settings;
   StimulusLibrary library;
-  participants::ShapeHypotheses hypotheses;
-  participants::BlockHypotheses of_blocks;  ///< version 2
+  participants::ShapeHypotheses hypotheses;  ///< of a hand that explores and asks for no shape
+  participants::BlockHypotheses of_blocks;
   std::uint64_t seed;  ///< of the participants; the schedule has the protocol's own
-  participants::JudgementOf planned = {};  ///< version 2: as a plan says; empty: from what is felt
+  participants::JudgementOf planned =
+      {};  ///< of blocks of tasks: as a plan says; empty: from what is felt
 };
 
 struct SimulatedSession {
   int participant = 1;  ///< number
-  SessionPlan plan;
+  protocols::SessionPlan plan;
   std::int64_t clock_ns = 0;  ///< start of its clock
   data::ClockStamp utc;
   LevelAdvisor* advisor = nullptr;
@@ -88,7 +89,7 @@ struct StudyProgress {
   struct Answers {
     std::int64_t trials = 0, unanswered = 0;
   };
-  std::map<std::string, Answers> by_block = {};  ///< version 2: since this call
+  std::map<std::string, Answers> by_block = {};  ///< since this call
 };
 
 struct LimitedForSimulation {
@@ -99,9 +100,6 @@ struct LimitedForSimulation {
 /// asks for that (servo.material_limit).
 LimitedForSimulation limit_for_simulation(protocols::Protocol& protocol,
                                           const participants::SimulatedSettings& settings);
-
-/// The stimuli as hypotheses of the observer.
-std::vector<stimuli::ObjectSpec> shapes_of(const protocols::Protocol& protocol);
 
 /// The reasons that the simulated device or participant cannot run a protocol, a sentence each;
 /// empty: they can.

@@ -16,8 +16,8 @@
 
 #include "data/base/json_text.h"
 #include "data/base/text.h"
+#include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
-#include "protocols/tasks/task_plan.h"
 
 namespace palpate::runner::session {
 namespace {
@@ -81,7 +81,6 @@ SocketAdvisor::SocketAdvisor(const protocols::Protocol& protocol, Settings setti
                              const std::vector<data::TrialRecord>& history)
     : protocol_(protocol), settings_(std::move(settings)) {
   for (const data::TrialRecord& record : history) {
-    if (!record.task.of_block()) continue;
     history_ += (history_.empty() ? "" : ",") + json_of(record).dump();
   }
   if (!connect()) throw std::invalid_argument(settings_.path + ": " + trouble_);
@@ -187,7 +186,7 @@ std::optional<double> SocketAdvisor::level_in(const std::string& line,
     trouble_ = "expected the answer to trial " + std::to_string(next.trial) + found;
     return std::nullopt;
   }
-  const auto& block = *protocols::block_of(protocol_, next);
+  const auto& block = protocols::block_of(protocol_, next);
   const std::vector<double> levels = protocols::levels_of(block);
   const auto level = message.value("level", nlohmann::json());
   const double value = level.is_number() ? level.get<double>() : NAN;
@@ -200,7 +199,7 @@ std::optional<double> SocketAdvisor::level_in(const std::string& line,
 std::optional<double> SocketAdvisor::ask(const protocols::Trial& next) {
   trouble_.clear();
   if (socket_ < 0 && !connect()) return std::nullopt;
-  const auto& block = *protocols::block_of(protocol_, next);
+  const auto& block = protocols::block_of(protocol_, next);
   const std::vector<double> levels = protocols::levels_of(block);
   const auto until = steady_clock::now() + std::chrono::duration_cast<steady_clock::duration>(
                                                std::chrono::duration<double>(settings_.time_out));

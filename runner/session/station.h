@@ -9,6 +9,7 @@
 
 #include "data/record.h"
 #include "protocols/protocol.h"
+#include "protocols/session_plan.h"
 #include "runner/participants/keyboard.h"
 #include "runner/safety/guarded_device.h"
 #include "runner/scene_builder.h"
@@ -16,7 +17,6 @@
 #include "runner/session/device_check.h"
 #include "runner/session/markers.h"
 #include "runner/session/run_record.h"
-#include "runner/session/session_plan.h"
 #include "runner/session/socket_advisor.h"
 #include "runner/sound/masking_noise.h"
 
@@ -26,7 +26,7 @@ namespace palpate::runner::session {
 struct Station {
   const protocols::Protocol& protocol;  ///< its materials limited to the device
   const StimulusLibrary& library;  ///< the protocol's stimuli at all levels, as convex meshes, m
-  SessionPlan plan;                ///< the schedule, initially at the first unrecorded trial
+  protocols::SessionPlan plan;     ///< the schedule, initially at the first unrecorded trial
   servo::TickSource& servo;        ///< the servo loop: one sample a tick. Live: the servo thread
   servo::Clock& clock;   ///< session clock, ns: of ticks, keys, markers. Simulated: virtual
   data::ClockStamp utc;  ///< one moment on the session clock and in UTC

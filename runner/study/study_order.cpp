@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "data/base/checksum.h"
+#include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
 #include "runner/study/task_words.h"
 
@@ -33,19 +34,11 @@ OrderRow row_of(const Protocol& protocol, const protocols::Trial& trial) {
                protocols::to_string(trial.renderer),
                protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name,
                {q.w, q.x, q.y, q.z}};
-  if (const TaskBlock* const block = protocols::block_of(protocol, trial))
-    row.task = {trial.block, block->name,       trial.track,
-                trial.level, trial.catch_trial, comparison_interval(*block, trial)};
+  const TaskBlock& block = protocols::block_of(protocol, trial);
+  if (!block.name.empty())
+    row.task = {trial.block, block.name,        trial.track,
+                trial.level, trial.catch_trial, comparison_interval(block, trial)};
   return row;
-}
-
-/// Of a protocol without blocks.
-std::vector<OrderRow> rows_of_version_1(const Protocol& protocol, int number) {
-  std::vector<OrderRow> rows;
-  for (const protocols::Trial& trial : protocols::schedule(protocol, number)) {
-    if (!trial.practice) rows.push_back(row_of(protocol, trial));
-  }
-  return rows;
 }
 
 /// The draws of an adaptive block, for as many trials as it may have.
@@ -80,10 +73,10 @@ constexpr protocols::TrialOutcome kAnyAnswer{true, true, true, std::nullopt};
 std::string session_lines(const Protocol& protocol, int number, int session) {
   std::string out;
   int block = 0;
-  for (protocols::TaskPlan plan(protocol, number, session); !plan.finished();
+  for (protocols::SessionPlan plan(protocol, number, session); !plan.finished();
        plan.answered(kAnyAnswer)) {
     const protocols::Trial& trial = plan.next();
-    const TaskBlock& shown = *protocols::block_of(protocol, trial);
+    const TaskBlock& shown = plan.block();
     if (trial.practice) continue;
     if (!protocols::is_adaptive(shown)) {
       out += to_line(row_of(protocol, trial)) + "\n";
@@ -120,11 +113,7 @@ std::string to_line(const OrderRow& row) {
 
 std::string fixed_order(const Protocol& protocol, int participant_number) {
   std::string lines;
-  if (protocol.blocks.empty()) {
-    for (const OrderRow& row : rows_of_version_1(protocol, participant_number))
-      lines += to_line(row) + "\n";
-  }
-  for (int session = 1; !protocol.blocks.empty() && session <= protocol.sessions.count; ++session)
+  for (int session = 1; session <= protocol.sessions.count; ++session)
     lines += session_lines(protocol, participant_number, session);
   return lines;
 }
@@ -136,15 +125,9 @@ std::string order_checksum(const Protocol& protocol, int participant_number) {
 ExpectedTrials expected_trials(const Protocol& protocol, int participant_number,
                                const std::vector<ShownTrial>& shown) {
   ExpectedTrials out;
-  if (protocol.blocks.empty()) {
-    out.rows = rows_of_version_1(protocol, participant_number);
-    out.complete = static_cast<std::size_t>(
-                       std::ranges::count(shown, false, &ShownTrial::practice)) == out.rows.size();
-    return out;
-  }
   out.complete = true;
   for (int session = 1; session <= protocol.sessions.count; ++session) {
-    protocols::TaskPlan plan(protocol, participant_number, session);
+    protocols::SessionPlan plan(protocol, participant_number, session);
     for (const ShownTrial& one : shown) {
       if (one.row.session != session || plan.finished()) continue;
       if (!plan.next().practice) out.rows.push_back(row_of(protocol, plan.next()));
@@ -156,7 +139,6 @@ ExpectedTrials expected_trials(const Protocol& protocol, int participant_number,
 }
 
 std::size_t planned_trials(const Protocol& protocol) {
-  if (protocol.blocks.empty()) return static_cast<std::size_t>(protocols::main_trials(protocol));
   long long trials = 0;
   for (const TaskBlock& block : protocol.blocks)
     trials += block.practice ? 0 : protocols::expected_trials_of(block);
@@ -169,16 +151,20 @@ bool has_adaptive_blocks(const Protocol& protocol) {
   });
 }
 
+std::string conditions_in_words(const Protocol& protocol) {
+  return protocols::study_of_shapes(protocol) ? "renderers" : "blocks";
+}
+
 std::string condition_order(const Protocol& protocol, int participant_number) {
   std::vector<std::string> names;
-  if (protocol.blocks.empty()) {
-    for (const OrderRow& row : rows_of_version_1(protocol, participant_number))
-      names.push_back(row.renderer);
+  if (protocols::study_of_shapes(protocol)) {
+    for (const protocols::Trial& trial : protocols::schedule(protocol, participant_number))
+      names.emplace_back(protocols::to_string(trial.renderer));
   }
-  for (int session = 1; !protocol.blocks.empty() && session <= protocol.sessions.count; ++session) {
+  for (int session = 1; session <= protocol.sessions.count; ++session) {
     for (const int index : protocols::blocks_in_order(protocol, participant_number, session)) {
       const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
-      if (!block.practice) names.push_back(block.name);
+      if (!block.practice && !block.name.empty()) names.push_back(block.name);
     }
   }
   return joined_in_order(names);
@@ -190,11 +176,6 @@ std::string condition_order(const std::vector<ShownTrial>& shown) {
     if (!one.practice) names.push_back(one.row.task ? one.row.task->name : one.row.renderer);
   }
   return joined_in_order(names);
-}
-
-int condition_orders(const Protocol& protocol) {
-  if (protocol.blocks.empty()) return protocols::renderer_orders(protocol);
-  return protocols::block_orders(protocol);
 }
 
 }  // namespace palpate::runner::study

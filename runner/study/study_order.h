@@ -10,7 +10,7 @@
 
 #include "protocols/protocol.h"
 #include "protocols/schedule.h"
-#include "protocols/tasks/task_plan.h"
+#include "protocols/session_plan.h"
 
 namespace palpate::runner::study {
 
@@ -65,11 +65,11 @@ std::size_t planned_trials(const protocols::Protocol& protocol);
 /// Whether answers choose levels of trials for analysis.
 bool has_adaptive_blocks(const protocols::Protocol& protocol);
 
-/// The order in which renderers, or blocks, come: "point, then ray".
+/// "renderers" or "blocks": of which the order differs over participants.
+std::string conditions_in_words(const protocols::Protocol& protocol);
+/// The order in which they come: "point, then ray".
 std::string condition_order(const protocols::Protocol& protocol, int participant_number);
 /// The same of trials that were shown.
 std::string condition_order(const std::vector<ShownTrial>& shown);
-/// Participant numbers after which it repeats; 1: it is the same for everybody, or mixed.
-int condition_orders(const protocols::Protocol& protocol);
 
 }  // namespace palpate::runner::study

@@ -1,45 +1,16 @@
 #include "runner/study/study_trials.h"
 
-#include <stdexcept>
 #include <utility>
-#include <vector>
 
 #include "data/base/text.h"
-#include "data/store/store.h"
-#include "data/stored_protocol.h"
 #include "runner/usage_error.h"
 
 namespace palpate::runner::study {
-
-analysis::TrialTable read_study_trials(const std::string& database, const std::string& csv,
-                                       const std::string& protocol) {
-  if (!csv.empty()) return analysis::read_trials_csv(csv, protocol);
-  try {
-    return analysis::read_trials_store(database, protocol);
-  } catch (const data::StoreRefused& error) {
-    throw UsageError(error.what());  // the named file is bad input: status 2
-  }
-}
-
-bool is_of_tasks(const std::string& database, const std::string& csv, const std::string& protocol) {
-  try {
-    if (!csv.empty()) return analysis::has_task_trials(csv, protocol);
-    std::vector<data::ProtocolInfo> wanted =
-        data::Store::open(database, data::Store::Mode::read_only).protocols();
-    std::erase_if(wanted, [&](const data::ProtocolInfo& one) {
-      return !analysis::is_protocol(protocol, one.name, one.sha256);
-    });
-    return data::have_blocks(wanted);
-  } catch (const std::runtime_error&) {
-    return false;
-  }
-}
-
 namespace {
 
 /// Refuses several protocols: blocks of the same name in two protocols are different. \throws
 /// UsageError
-void require_one_protocol(const analysis::TaskTable& table, const std::string& wanted) {
+void require_one_protocol(const analysis::StudyTable& table, const std::string& wanted) {
   if (table.protocols.size() < 2) return;
   std::string names;
   bool one_name = true;
@@ -59,14 +30,39 @@ void require_one_protocol(const analysis::TaskTable& table, const std::string& w
 
 }  // namespace
 
-analysis::TaskTable read_study_tasks(const std::string& database, const std::string& csv,
-                                     const std::string& protocol,
-                                     const std::vector<analysis::ProtocolText>& protocols) {
-  analysis::TaskTable table = csv.empty()
-                                  ? analysis::read_task_trials_store(database, protocol)
-                                  : analysis::read_task_trials_csv(csv, protocol, protocols);
-  require_one_protocol(table, protocol);
-  return table;
+data::Store open_study(const std::string& database) {
+  try {
+    return data::Store::open(database, data::Store::Mode::read_only);
+  } catch (const data::StoreRefused& error) {
+    throw UsageError(error.what());  // the named file is bad input: status 2
+  }
+}
+
+Study read_study(data::Store& store, const std::string& protocol, bool with_record) {
+  Study study;
+  study.table = analysis::read_study_store(store, protocol);
+  require_one_protocol(study.table, protocol);
+  if (with_record) study.record = analysis::read_study_record(store, protocol);
+  return study;
+}
+
+Study read_study(const StudySource& source, bool with_record) {
+  if (source.csv.empty()) {
+    data::Store store = open_study(source.database);
+    return read_study(store, source.protocol, with_record);
+  }
+  std::vector<std::string> wanted;
+  if (!source.protocol.empty()) wanted.push_back(source.protocol);
+  Study study;
+  study.table = analysis::read_study_csv(source.csv, wanted, source.protocols);
+  require_one_protocol(study.table, source.protocol);
+  return study;
+}
+
+analysis::StudyAnalysis analyze_study(analysis::StudyTable table, double too_fast) {
+  analysis::AnalysisSettings settings;
+  settings.too_fast = too_fast;
+  return analysis::analyze_study(std::move(table), {}, settings, PALPATE_VERSION);
 }
 
 }  // namespace palpate::runner::study

@@ -4,25 +4,34 @@
 #include <string>
 #include <vector>
 
-#include "analysis/input/task_trials.h"
-#include "analysis/input/trials.h"
+#include "analysis/input/study_record.h"
+#include "analysis/input/study_table.h"
+#include "analysis/statistics/task_analysis.h"
+#include "data/store/store.h"
 
 namespace palpate::runner::study {
 
-/// The trials of a study: from the CSV file if given, else from the database.
-/// \param protocol  of several protocols, the one that is wanted (analysis::is_protocol)
-/// \throws UsageError, InputError: the file is not a study's
-analysis::TrialTable read_study_trials(const std::string& database, const std::string& csv,
-                                       const std::string& protocol = "");
+struct StudySource {
+  std::string database = {}, csv = {};  ///< one of them
+  std::string protocol = {};  ///< of several protocols, the one that is wanted (is_protocol)
+  std::vector<analysis::ProtocolText> protocols = {};  ///< of a table's trials, if known
+};
 
-/// Whether the trials are of tasks, to be read by read_study_tasks. The reader reports unreadable
-/// data.
-bool is_of_tasks(const std::string& database, const std::string& csv, const std::string& protocol);
+struct Study {
+  analysis::StudyTable table;
+  analysis::StudyRecord record;  ///< as far as it was asked for; of a table always empty
+};
 
-/// The trials of a study of version 2, as above. \param protocols  of a table's trials, if known
-/// \throws UsageError: they are of several protocols
-analysis::TaskTable read_study_tasks(const std::string& database, const std::string& csv,
-                                     const std::string& protocol,
-                                     const std::vector<analysis::ProtocolText>& protocols = {});
+/// Opens a study's database to read it. \throws UsageError: it is none
+data::Store open_study(const std::string& database);
+
+/// \param protocol  the one that is wanted (is_protocol) \param with_record  reads it, too
+/// \throws UsageError: tasks are of several protocols; InputError
+Study read_study(data::Store& store, const std::string& protocol, bool with_record = false);
+/// The same of a database or a table. \throws UsageError: the file is not a study's, too
+Study read_study(const StudySource& source, bool with_record = false);
+
+/// \param too_fast  s, limit of too fast answers
+analysis::StudyAnalysis analyze_study(analysis::StudyTable table, double too_fast);
 
 }  // namespace palpate::runner::study

@@ -12,6 +12,7 @@
 
 #include "data/base/random.h"
 #include "protocols/procedures/procedure.h"
+#include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
 #include "runner/output/outputs.h"
 #include "runner/usage_error.h"
@@ -30,7 +31,7 @@ struct ListedTrial {
 using protocols::level_text;
 
 ListedTrial listed(const protocols::Protocol& protocol, const protocols::Trial& trial) {
-  const auto& block = *protocols::block_of(protocol, trial);
+  const auto& block = protocols::block_of(protocol, trial);
   return {trial,
           block,
           protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name,
@@ -276,10 +277,10 @@ std::vector<protocols::Trial> example_trials(const protocols::Protocol& protocol
   std::vector<protocols::Trial> trials;
   Random random(protocol.seed, {static_cast<std::uint64_t>(participant), 0x5c});
   for (int session = 1; session <= protocol.sessions.count; ++session) {
-    protocols::TaskPlan plan(protocol, participant, session);
+    protocols::SessionPlan plan(protocol, participant, session);
     while (!plan.finished()) {
       const protocols::Trial& trial = plan.next();
-      const auto& block = *protocols::block_of(protocol, trial);
+      const auto& block = protocols::block_of(protocol, trial);
       const bool success = succeeds(protocol, block, trial, random);
       trials.push_back(trial);
       plan.answered({success, success, true});

@@ -8,7 +8,7 @@
 
 #include "protocols/protocol.h"
 #include "protocols/schedule.h"
-#include "protocols/tasks/task_plan.h"
+#include "protocols/session_plan.h"
 #include "runner/usage_error.h"
 
 namespace palpate::runner::study {

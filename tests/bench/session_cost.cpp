@@ -103,7 +103,7 @@ std::size_t run(const std::string& which, std::uint32_t ticks) {
   Patient participant(ticks);
   runner::servo::VirtualClock clock;
   NoLog log;
-  runner::session::SessionPlan plan(protocol, 1, 1);
+  protocols::SessionPlan plan(protocol, 1, 1);
   const rendering::Scene scene = library.scene(plan.next());
   Stroke stroke(scene, rendering::ray_renderer(), ticks);
   if (which == "least") {

@@ -5,7 +5,8 @@
 
 #include "protocols/parse.h"
 #include "protocols/schedule.h"
-#include "protocols/tasks/task_plan.h"
+#include "protocols/session_plan.h"
+#include "protocols/tasks/block_order.h"
 
 using palpate::protocols::Protocol;
 
@@ -21,7 +22,7 @@ void check_tasks(const Protocol& protocol) {
   for (const palpate::protocols::TaskBlock& block : protocol.blocks) {
     if (palpate::protocols::most_trials_of(block) > 2'000) return;
   }
-  palpate::protocols::TaskPlan plan(protocol, 1, 1);
+  palpate::protocols::SessionPlan plan(protocol, 1, 1);
   const std::size_t most = plan.size();
   for (std::size_t i = 0; !plan.finished(); ++i) {
     if (i > most) std::abort();

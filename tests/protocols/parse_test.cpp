@@ -154,8 +154,8 @@ TEST(Parse, ReadsEveryKey) {
   EXPECT_EQ(answer_label(p, "Tetra-4"), "Tetra-4");
   EXPECT_EQ(p.texts.move_away + p.texts.ready + p.texts.go + p.texts.wait + p.texts.other_key,
             "Weg von der MitteBereitLosBitte wartenDiese Taste gilt nicht");
-  EXPECT_EQ(p.response.time_out, 20.5);
-  EXPECT_TRUE(p.response.feedback);
+  EXPECT_EQ(p.blocks.front().time_out, 20.5);
+  EXPECT_TRUE(p.blocks.front().feedback);
   EXPECT_EQ(p.stylus.length, 0.1);
   EXPECT_EQ(p.stylus.grip, 0.05);
   EXPECT_EQ(p.workspace.centre, Vec3(0, 0.01, 0.02));
@@ -186,7 +186,7 @@ TEST(Parse, KeepsDefaults) {
   EXPECT_EQ(p.renderer_order, RendererOrder::counterbalanced);
   EXPECT_EQ(p.orientation, OrientationKind::uniform);
   EXPECT_EQ(p.practice.max_rounds, 1);
-  EXPECT_EQ(p.response.time_out, 60);
+  EXPECT_EQ(p.blocks.front().time_out, 60);
   EXPECT_EQ(p.stylus.length, 0.12);
   EXPECT_EQ(p.stimuli[0].object.material.stiffness, 800);
   EXPECT_EQ(p.seed, 0u);

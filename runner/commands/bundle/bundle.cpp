@@ -91,9 +91,8 @@ int make_bundle(const BundleOptions& options) {
   put_data(options, store, about, draft);
   put_registration(options.registration, draft);
   registration::write_member(draft, "about.json", about_text);
-  registration::write_member(
-      draft, registration::kRecord,
-      registration::record_json(analysis::read_study_record(options.database), check));
+  registration::write_member(draft, registration::kRecord,
+                             registration::record_json(analysis::read_study_record(store), check));
   const registration::BundleFacts facts = registration::bundle_facts(draft / "", check.points);
   for (const auto& [name, text] : registration::derived_files(facts))
     registration::write_member(draft, name, text);

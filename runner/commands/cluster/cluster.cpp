@@ -29,7 +29,7 @@
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "protocols/protocol.h"
-#include "protocols/tasks/task_plan.h"
+#include "protocols/tasks/block_order.h"
 #include "runner/commands/plan/plan.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/study_options.h"
@@ -409,10 +409,7 @@ int begin(const ClusterSettings& settings, sweep::ClusterJob job,
 }
 
 /// Stimuli that a participant feels: each interval of a task, adaptive blocks at their longest.
-/// \param repetitions  without blocks of tasks
-double stimuli_felt(const protocols::Protocol& protocol, int repetitions) {
-  if (protocol.blocks.empty())
-    return static_cast<double>(protocol.stimuli.size() * protocol.renderers.size()) * repetitions;
+double stimuli_felt(const protocols::Protocol& protocol) {
   double felt = 0;
   for (const protocols::TaskBlock& block : protocol.blocks) {
     const bool with_standard =
@@ -441,9 +438,10 @@ int begin_sweep(const ClusterSettings& settings, const SweepSettings& sweep) {
   job.work = "sweep";
   job.unit = "points";
   job.items = planned.plan.points;
-  const int repetitions = sweep.repetitions > 0 ? sweep.repetitions : planned.protocol.repetitions;
+  const double times =
+      sweep.repetitions > 0 ? 1.0 * sweep.repetitions / planned.protocol.repetitions : 1;
   return begin(settings, job, planned.protocol, {sweep.space, sweep.patch}, command,
-               sweep.participants * stimuli_felt(planned.protocol, repetitions));
+               sweep.participants * times * stimuli_felt(planned.protocol));
 }
 
 int begin_study(const ClusterSettings& settings, const StudyOptions& study) {
@@ -462,8 +460,7 @@ int begin_study(const ClusterSettings& settings, const StudyOptions& study) {
   job.unit = "sessions";
   job.items = study.participants;
   job.per_item = protocol.sessions.count;
-  return begin(settings, job, protocol, {study.patch}, command,
-               stimuli_felt(protocol, protocol.repetitions));
+  return begin(settings, job, protocol, {study.patch}, command, stimuli_felt(protocol));
 }
 
 int cluster_submit(const std::string& given) {

@@ -181,7 +181,8 @@ void require_samples(const MovementStudy& study, const std::string& database) {
 
 MovementStudy measure_study(const MovementRequest& request) {
   MovementStudy study;
-  study.table.trials = study::read_study_trials(request.database, "", request.protocol);
+  data::Store store = study::open_study(request.database);
+  study.table.trials = analysis::read_trials_store(store, request.protocol);
   study.table.settings = request.settings;
   output::CsvText csv(columns(), "\n");
   movement::StudyStimuli stimuli(request.mesh_folder);

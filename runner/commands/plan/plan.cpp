@@ -163,12 +163,11 @@ std::string put_default_effects(analysis::StudyModel& model) {
 
 /// The times of a pilot, which may be of a protocol with tasks. \throws UsageError
 analysis::TrialTable pilot_trials(const PlanOptions& options) {
-  const auto& [database, csv, protocol] = std::tie(options.database, options.csv, options.protocol);
-  if (!study::is_of_tasks(database, csv, protocol))
-    return study::read_study_trials(database, csv, protocol);
-  const analysis::TaskTable tasks = study::read_study_tasks(database, csv, protocol);
-  if (auto times = analysis::identification_of(tasks)) return std::move(*times);
-  throw UsageError(printable(tasks.source) +
+  analysis::StudyTable pilot =
+      study::read_study({options.database, options.csv, options.protocol}).table;
+  analysis::identify_times(pilot);
+  if (pilot.times) return std::move(*pilot.times);
+  throw UsageError(printable(pilot.source) +
                    ": expected a pilot in which stimuli are identified; plan --jnd-effect is for "
                    "thresholds and needs no pilot");
 }

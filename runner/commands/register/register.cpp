@@ -25,6 +25,7 @@
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "protocols/protocol.h"
+#include "protocols/tasks/block_order.h"
 #include "runner/build_info.h"
 #include "runner/commands/shared/command.h"
 #include "runner/output/progress_line.h"
@@ -206,16 +207,15 @@ std::vector<std::string> warnings_of(const registration::Registration& made) {
                        ? "."
                        : ", with a power of " + analysis::fixed(100 * power->second, 0) + " %."));
   }
-  const auto orders = static_cast<std::size_t>(study::condition_orders(made.protocol));
-  const bool tasks = !made.protocol.blocks.empty();
+  const auto orders = static_cast<std::size_t>(protocols::block_orders(made.protocol));
   if (made.participants % orders != 0)
-    out.push_back(std::string("The orders of the ") + (tasks ? "blocks" : "renderers") +
+    out.push_back(std::string("The orders of the ") + study::conditions_in_words(made.protocol) +
                   " repeat after " + std::to_string(orders) + " participants: with " +
                   std::to_string(made.participants) + " they are not balanced.");
   if (!made.plan.pilot_label.empty())
     out.push_back("The plan rests on " + made.plan.pilot_label +
                   ": their standard deviations are a model's.");
-  if (tasks && !registration::conditions_of(made.protocol, made.plan).differ)
+  if (!registration::conditions_of(made.protocol, made.plan).differ)
     out.emplace_back(
         "The plan is of a difference between two conditions; the protocol has one. The simulated "
         "studies with the planned effect and with none are alike.");

@@ -160,7 +160,7 @@ std::string to_text(const std::string& name, const session::RecordedTrial& trial
   if (trial.limited)
     text += "With the materials as they were limited to what the device can show.\n";
   text += verdict(trial, found);
-  if (record.task.of_block()) text += intervals_text(found);
+  if (!record.task.intervals.empty()) text += intervals_text(found);
   text += in_words(found.recorded, "recorded");
   if (found.other) {
     text += in_words(*found.other, "same way") +
@@ -183,7 +183,7 @@ std::string to_json_text(const std::string& name, const session::RecordedTrial& 
                  {"periods_on_record", found.periods_known},
                  {"material_limited", trial.limited},
                  {"recorded", to_json(found.recorded)}};
-  if (trial.stored.record.task.of_block()) {
+  if (!trial.stored.record.task.intervals.empty()) {
     result["task"] = trial.stored.record.task.task;
     result["intervals"] = intervals_json(found);
   }
@@ -197,7 +197,7 @@ std::string to_json_text(const std::string& name, const session::RecordedTrial& 
 
 std::string to_csv(const session::RecordedTrial& trial, const session::ReplayComparison& found) {
   const data::TrialRecord& record = trial.stored.record;
-  const bool with_intervals = record.task.of_block();
+  const bool with_intervals = !record.task.intervals.empty();
   const bool with_body = !record.bodies.empty();
   std::string text = csv_header(found.other.has_value(), with_intervals, with_body);
   for (const session::ReplayedTick& tick : found.ticks) {

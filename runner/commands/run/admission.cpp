@@ -330,7 +330,7 @@ std::string spoken_time(std::int64_t utc_ns, std::int64_t now_utc_ns) {
 }
 
 std::string resumption(data::Store& store, const data::Participant& participant, int session,
-                       const session::SessionPlan& plan) {
+                       const protocols::SessionPlan& plan) {
   const std::optional<data::StoredRun> last = newest_run(store, [&](const data::StoredRun& run) {
     return run.participant.id == participant.id && run.info.session == session;
   });

@@ -10,9 +10,9 @@
 #include "data/record.h"
 #include "data/store/store.h"
 #include "protocols/protocol.h"
+#include "protocols/session_plan.h"
 #include "runner/commands/run/settings.h"
 #include "runner/servo/device.h"
-#include "runner/session/session_plan.h"
 
 namespace palpate::runner::commands {
 
@@ -36,7 +36,7 @@ std::string spoken_time(std::int64_t utc_ns, std::int64_t now_utc_ns);
 /// "12 of 24 trials done, last run yesterday 15:02 (paused), continues with trial 13". Empty if the
 /// session was never begun.
 std::string resumption(data::Store& store, const data::Participant& participant, int session,
-                       const session::SessionPlan& plan);
+                       const protocols::SessionPlan& plan);
 
 /// Refuses a code whose newest run, in any protocol, ended with a withdrawal. \throws UsageError
 void refuse_withdrawn(data::Store& store, const std::string& code);

@@ -48,7 +48,7 @@ void check_fitness(const OpenDevice& open, const RunSettings& settings,
   for (const std::string& reason : session::incompatibilities(protocol, library, able))
     reasons += "\n" + reason;
   if (!reasons.empty()) throw UsageError("this protocol cannot be run with this device:" + reasons);
-  std::size_t answers = protocol.response.keys.size();
+  std::size_t answers = 0;
   for (const protocols::TaskBlock& block : protocol.blocks)
     answers = std::max(answers, block.answers.size());
   if (settings.buttons && answers > 8)

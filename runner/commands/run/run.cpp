@@ -18,7 +18,8 @@
 #include "data/store/store.h"
 #include "data/store/task_text.h"
 #include "protocols/answer_keys.h"
-#include "protocols/tasks/task_plan.h"
+#include "protocols/session_plan.h"
+#include "protocols/tasks/block_order.h"
 #include "protocols/tasks/texts.h"
 #include "runner/commands/run/admission.h"
 #include "runner/commands/run/opening.h"
@@ -29,6 +30,7 @@
 #include "runner/session/live_session.h"
 #include "runner/session/markers.h"
 #include "runner/session/preflight.h"
+#include "runner/session/recorded_outcome.h"
 #include "runner/session/sample_stream.h"
 #include "runner/session/socket_advisor.h"
 #include "runner/session/station.h"
@@ -340,7 +342,7 @@ int run_command(const std::vector<std::string>& args) {
       run_info(settings, device, session, began, has_joystick(settings, protocol)),
       other_texts(admission));
   const data::SessionProgress progress = store.progress(participant, session);
-  session::SessionPlan plan(protocol, participant.enrolled_number, session);
+  protocols::SessionPlan plan(protocol, participant.enrolled_number, session);
   for (const data::TrialRecord& trial : progress.completed)
     plan.answered(session::outcome_of(trial));
   const std::string resumed = resumption(store, participant, session, plan);

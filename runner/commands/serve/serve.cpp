@@ -12,6 +12,7 @@
 #include "data/files/atomic_file.h"
 #include "data/store/store.h"
 #include "protocols/json_document.h"
+#include "protocols/session_plan.h"
 #include "runner/commands/run/admission.h"
 #include "runner/commands/run/opening.h"
 #include "runner/commands/shared/command.h"
@@ -21,6 +22,7 @@
 #include "runner/serve/served_session.h"
 #include "runner/servo/realtime.h"
 #include "runner/session/device_check.h"
+#include "runner/session/recorded_outcome.h"
 #include "runner/touch/forces.h"
 #include "runner/touch/trial_page.h"
 
@@ -317,7 +319,7 @@ int serve_session(const RunSettings& settings, const po::variables_map& values) 
   info.response_device = "another program";
   session::RunRecord record(store, admission.enrolled, participant, info, other_texts(admission));
   const data::SessionProgress progress = store.progress(participant, session);
-  session::SessionPlan plan(protocol, participant.enrolled_number, session);
+  protocols::SessionPlan plan(protocol, participant.enrolled_number, session);
   for (const data::TrialRecord& trial : progress.completed)
     plan.answered(session::outcome_of(trial));
   if (const std::string resumed = resumption(store, participant, session, plan); !resumed.empty())

@@ -17,6 +17,7 @@
 #include "data/base/checksum.h"
 #include "data/base/json_text.h"
 #include "data/base/text.h"
+#include "protocols/schedule.h"
 #include "runner/commands/shared/study_options.h"
 #include "runner/session/run_record.h"
 #include "runner/session/simulated_study.h"
@@ -217,14 +218,14 @@ std::vector<double> figures_of_participants(const analysis::TaskCell& cell,
 }
 
 /// Shares correct, or means of the times of correct answers, of each participant with a stimulus.
-std::vector<double> identified(const analysis::TaskTable& table, const data::TaskCellColumns& cell,
+std::vector<double> identified(const analysis::StudyTable& table, const data::TaskCellColumns& cell,
                                bool times) {
   struct Sum {
     double sum = 0;
     int n = 0;
   };
   std::map<std::string, Sum> sums;
-  for (const analysis::TaskTrial& trial : table.trials) {
+  for (const analysis::StudyTrial& trial : table.trials) {
     if (trial.block_name != cell.block || trial.shape != cell.stimulus ||
         trial.renderer != cell.renderer)
       continue;
@@ -241,10 +242,10 @@ std::vector<double> identified(const analysis::TaskTable& table, const data::Tas
 
 /// The figures of a protocol of version 2, in the order of figure_columns().
 std::vector<std::optional<double>> task_figures_of(const data::SweepPlan& plan,
-                                                   analysis::TaskTable table) {
+                                                   analysis::StudyTable table) {
   analysis::FunctionSettings without_p;
   without_p.simulations = 0;
-  const analysis::TaskAnalysis found = analysis::analyze_tasks(std::move(table), without_p);
+  const analysis::StudyAnalysis found = analysis::analyze_study(std::move(table), without_p);
   std::vector<std::optional<double>> out;
   for (const data::TaskCellColumns& wanted : data::task_columns(plan)) {
     const auto cell =
@@ -361,16 +362,16 @@ std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
     const participants::SimulatedSettings settings =
         participants::read_simulated_settings(study.settings.dump());
     session::limit_for_simulation(protocol, settings);
-    const bool has_blocks = !protocol.blocks.empty();
+    const bool has_blocks = !protocols::study_of_shapes(protocol);
     TrialCollection trials(sweep.plan);
-    analysis::TaskTable tasks;
+    analysis::StudyTable tasks;
     const bool done = session::simulate_in_memory(
         protocol, settings, sweep.plan.participants, study.seed, stop,
         [&](int participant, const data::TrialRecord& record, std::uint64_t contact_ticks) {
           if (!has_blocks) return trials.add(participant, record, contact_ticks);
           if (!record.practice)
             tasks.trials.push_back(
-                analysis::task_trial_of(session::simulated_code(participant), record));
+                analysis::study_trial_of(session::simulated_code(participant), record));
         });
     if (!done) return std::nullopt;
     row.figures = has_blocks ? task_figures_of(sweep.plan, std::move(tasks)) : trials.figures();

@@ -65,7 +65,7 @@ double overrun_of_times(int n) {
   TrialTableBuilder builder;
   for (int p = 0; p < n; ++p) {
     const std::string person = "P" + std::to_string(p);
-    RawTrial raw;
+    StudyTrial raw;
     raw.participant = person;
     raw.renderer = "ray";
     raw.shape = raw.response = "cone";
@@ -83,7 +83,7 @@ double overrun_of_times(int n) {
 }
 
 double overrun_of_tasks(std::size_t n) {
-  TaskAnalysis analysis;
+  StudyAnalysis analysis;
   TaskGroup& group = analysis.groups.emplace_back();
   group.task = "compare";
   group.measure = "jnd";
@@ -113,7 +113,7 @@ Analysis analysis_of(const std::vector<std::string>& renderers) {
     int number = 0;
     for (std::size_t r = 0; r < renderers.size(); ++r) {
       for (const std::string shape : {"cone", "cube"}) {
-        RawTrial raw;
+        StudyTrial raw;
         raw.participant = name;
         raw.renderer = renderers[r];
         raw.shape = raw.response = shape;

@@ -30,7 +30,7 @@ Analysis analysis_of(const std::vector<std::string>& renderers, std::size_t shap
     for (std::size_t r = 0; r < renderers.size(); ++r) {
       for (std::size_t s = 0; s < shapes; ++s) {
         const std::string shape = "shape" + std::to_string(s);
-        RawTrial raw;
+        StudyTrial raw;
         raw.participant = name;
         raw.renderer = renderers[r];
         raw.shape = raw.response = shape;

@@ -27,7 +27,7 @@ Figure figure_of(const std::vector<Cell>& cells) {
   TrialTableBuilder builder;
   int trial = 0;
   const auto add = [&](const std::string& renderer, double time, bool timed_out) {
-    RawTrial raw;
+    StudyTrial raw;
     raw.participant = "A";
     raw.renderer = renderer;
     raw.shape = "cone";

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "analysis/input/study_record.h"
-#include "analysis/input/task_trials.h"
+#include "analysis/input/study_table.h"
 #include "analysis/input/trials.h"
 #include "data/base/checksum.h"
 #include "data/store/store.h"
@@ -62,7 +62,8 @@ TEST_F(TrialsStore, ReadsCompletedTrials) {
   practice.practice = true;
   study({practice, trial(2, "ray", "torus", "torus"), trial(3, "point", "wedge", ""),
          trial(4, "point", "cube", "wedge")});
-  const TrialTable table = read_trials_store(path_);
+  data::Store store = data::Store::open(path_, data::Store::Mode::read_only);
+  const TrialTable table = read_trials_store(store);
   EXPECT_EQ(table.participants, (std::vector<std::string>{"S1"}));
   EXPECT_EQ(table.renderers, (std::vector<std::string>{"point", "ray"}));
   EXPECT_EQ(table.shapes, (std::vector<std::string>{"cube", "wedge", "torus"}));
@@ -88,10 +89,11 @@ TEST_F(TrialsStore, SaysInHowManyTrialsTorqueWasLeftOut) {
   study({trial(1, "ray", "torus", "torus"), trial(2, "ray", "cube", "cube"),
          trial(3, "point", "wedge", "wedge")},
         "{}", data::kTorqueLeftOutNote);
-  EXPECT_EQ(read_trials_store(path_).warnings,
+  data::Store store = data::Store::open(path_, data::Store::Mode::read_only);
+  EXPECT_EQ(read_trials_store(store).warnings,
             (std::vector<std::string>{
                 "In 2 of 2 trials with ray torque was left out: the device drives force alone."}));
-  EXPECT_EQ(read_task_trials_store(path_).warnings, read_trials_store(path_).warnings);
+  EXPECT_EQ(read_study_store(store).times->warnings, read_trials_store(store).warnings);
 }
 
 TEST_F(TrialsStore, TheRecordHasTheServoOfEachRendererWithoutPractice) {
@@ -116,7 +118,8 @@ TEST_F(TrialsStore, TheRecordHasTheServoOfEachRendererWithoutPractice) {
   practice.ticks = 9999;
   study({first, second, third, point, practice},
         R"({"title": "A study", "seed": 18446744073709551615, "stimuli": []})");
-  const StudyRecord record = read_study_record(path_);
+  data::Store store = data::Store::open(path_, data::Store::Mode::read_only);
+  const StudyRecord record = read_study_record(store);
   ASSERT_EQ(record.servo.size(), 2U);
   EXPECT_EQ(record.servo[0].renderer, "point");
   EXPECT_EQ(record.servo[0].ticks, 7U);
@@ -151,7 +154,8 @@ TEST_F(TrialsStore, PeriodsBeyondTheBinsAreInTheLastOnes) {
   shortest.longest_period_ns = 10;
   longest.longest_period_ns = 3'600'000'000'000;  // an hour
   study({shortest, longest}, "{}");
-  const StudyRecord record = read_study_record(path_);
+  data::Store store = data::Store::open(path_, data::Store::Mode::read_only);
+  const StudyRecord record = read_study_record(store);
   EXPECT_EQ(record.servo[0].longest_periods.front(), 1U);
   EXPECT_EQ(record.servo[0].longest_periods.back(), 1U);
   EXPECT_EQ(record.protocols[0].title, "");
@@ -162,8 +166,8 @@ TEST_F(TrialsStore, PracticeAloneIsNothingToAnalyse) {
   auto practice = trial(1, "ray", "cube", "cube");
   practice.practice = true;
   study({practice});
-  EXPECT_THROW(read_trials_store(path_), protocols::InputError);
-  EXPECT_THROW(read_trials_store(folder_ / "none.db"), data::StoreRefused);
+  data::Store store = data::Store::open(path_, data::Store::Mode::read_only);
+  EXPECT_THROW(read_trials_store(store), protocols::InputError);
 }
 
 }  // namespace

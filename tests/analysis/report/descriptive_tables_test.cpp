@@ -27,7 +27,7 @@ struct Study {
   /// A trial; the response is empty for a time-out.
   void add(const std::string& participant, const std::string& renderer, const std::string& shape,
            const std::string& response, double time, bool practice = false) {
-    RawTrial raw;
+    StudyTrial raw;
     raw.participant = participant;
     raw.renderer = renderer;
     raw.shape = shape;

@@ -37,7 +37,7 @@ Analysis study_with(const std::vector<std::string>& renderers, double limit = 0)
     for (std::size_t r = 0; r < renderers.size(); ++r) {
       for (const char* const shape : {"sphere", "cone", "cylinder", "cube"}) {
         for (int i = 0; i < 6; ++i) {
-          RawTrial raw;
+          StudyTrial raw;
           raw.participant = participant;
           raw.renderer = renderers[(r + static_cast<std::size_t>(p)) % renderers.size()];
           raw.shape = shape;
@@ -46,7 +46,7 @@ Analysis study_with(const std::vector<std::string>& renderers, double limit = 0)
           raw.timed_out = limit > 0 && raw.response_time > limit;
           if (raw.timed_out) raw.response_time = limit;
           raw.correct = !raw.timed_out && random.unit() < 0.9;
-          if (!raw.timed_out) raw.response = raw.correct ? shape : "sphere";
+          if (!raw.timed_out) raw.response = *raw.correct ? shape : "sphere";
           if (raw.response == raw.shape) raw.correct = true;
           builder.add(raw);
         }

@@ -90,7 +90,7 @@ Analysis analysis_of(std::size_t renderers, std::size_t shapes) {
     for (std::size_t r = 0; r < renderers; ++r) {
       for (std::size_t s = 0; s < shapes; ++s) {
         for (int i = 0; i < 2; ++i) {
-          RawTrial raw;
+          StudyTrial raw;
           const std::string name = "P" + std::to_string(p), shape = "s" + std::to_string(s);
           const std::string renderer = r == 0 ? "point" : "r" + std::to_string(r);
           raw.participant = name;

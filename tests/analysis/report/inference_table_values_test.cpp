@@ -85,12 +85,12 @@ struct Study {
         const std::size_t r = p % 2 == 0 ? turn : renderers.size() - 1 - turn;
         for (std::size_t i = 0; i < kRepetitions; ++i) {
           for (std::size_t s = 0; s < kShapes; ++s) {
-            RawTrial raw;
+            StudyTrial raw;
             raw.participant = name;
             raw.renderer = renderers[r];
             raw.shape = kShapeNames[s];
             raw.correct = i >= wrong[r][s][p];
-            raw.response = kShapeNames[raw.correct ? s : 1 - s];
+            raw.response = kShapeNames[*raw.correct ? s : 1 - s];
             raw.trial = ++trial;
             raw.response_time = std::exp(log_times[r][s][p][i]);
             builder.add(raw);

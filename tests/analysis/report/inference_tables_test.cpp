@@ -30,7 +30,7 @@ Analysis varied_study(const std::vector<std::string>& renderers) {
     for (std::size_t r = 0; r < renderers.size(); ++r) {
       const double gain = 0.15 * static_cast<double>(r) * random.normal();
       for (int i = 0; i < 24; ++i) {
-        RawTrial raw;
+        StudyTrial raw;
         raw.participant = name;
         raw.renderer = renderers[r];
         raw.shape = raw.response = i % 2 == 0 ? "cone" : "cube";

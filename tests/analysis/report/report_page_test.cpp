@@ -21,7 +21,7 @@ Analysis small_analysis() {
     int trial = 0;
     for (const char* renderer : {"point", "ray"}) {
       for (const char* shape : {"cone", "cube"}) {
-        RawTrial raw;
+        StudyTrial raw;
         raw.participant = participant;
         raw.renderer = renderer;
         raw.shape = raw.response = shape;

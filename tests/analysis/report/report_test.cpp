@@ -42,7 +42,7 @@ Analysis analysis_of_study(const Study& study) {
     for (const auto& renderer : study.renderers) {
       for (const auto& shape : study.shapes) {
         for (int i = 0; i < study.repetitions; ++i) {
-          RawTrial raw;
+          StudyTrial raw;
           raw.participant = study.participants[p];
           raw.renderer = renderer;
           raw.shape = shape;

@@ -20,18 +20,18 @@ using testing::named_cell;
 using testing::track_of;
 using Expected = nlohmann::json;
 
-Expected json_of(const TaskAnalysis& analysis) {
+Expected json_of(const StudyAnalysis& analysis) {
   return Expected::parse(task_report_json(analysis, "1.2"));
 }
 
 Expected json_of_cell(TaskCell cell) {
-  TaskAnalysis analysis;
+  StudyAnalysis analysis;
   analysis.cells.push_back(std::move(cell));
   return json_of(analysis)["cells"][0];
 }
 
 TEST(TaskJson, HeadCountsWhatWasRead) {
-  TaskAnalysis analysis;
+  StudyAnalysis analysis;
   analysis.table.source = "study.csv";
   analysis.table.trials.resize(3);
   analysis.table.n_practice = 2;
@@ -235,7 +235,7 @@ TEST(TaskJson, GroupResultsHaveEveryFigure) {
   group.renderers[1].n_undetermined = 3;
   group.renderers[1].of_model = true;
   group.renderers[1].n_of_model = 4;
-  TaskAnalysis analysis;
+  StudyAnalysis analysis;
   analysis.groups = {group};
   EXPECT_EQ(json_of(analysis)["group_results"], Expected::parse(R"([{"task": "compare",
     "block_name": "stiff", "shape": "ball", "measure": "jnd", "unit": "N/m", "mean_is": "geometric",
@@ -272,7 +272,7 @@ TEST(TaskJson, ComparisonsHaveEveryFigure) {
   difference.effect_size.dz = -1.125;
   difference.mixed_estimate = -0.625;
   difference.mixed_se = 0.375;
-  TaskAnalysis analysis;
+  StudyAnalysis analysis;
   analysis.renderers = {one};
   one.comparison = {};
   one.comparison.undefined = "nothing";
@@ -303,7 +303,7 @@ TEST(TaskJson, ComparisonsHaveEveryFigure) {
 }
 
 TEST(TaskJson, GroupModelAndComparison) {
-  TaskAnalysis analysis;
+  StudyAnalysis analysis;
   TaskGroupModel model;
   model.block_name = "b";
   model.task = "compare";

@@ -28,7 +28,7 @@ const char* const kLogisticText =
     "the threshold on a grid.\n";
 
 std::string text_of_cell(TaskCell cell) {
-  TaskAnalysis analysis;
+  StudyAnalysis analysis;
   analysis.cells.push_back(std::move(cell));
   const std::string text = task_report_text(analysis);
   return text.substr(0, text.find("Intervals are"));
@@ -48,7 +48,7 @@ std::string line_of_function(const ParticipantFunction& one) {
 }
 
 TEST(TaskText, AnEmptyAnalysisSaysHowItIsDone) {
-  TaskAnalysis analysis;
+  StudyAnalysis analysis;
   EXPECT_EQ(task_report_text(analysis), kLogisticText);
   analysis.table.simulated = true;
   EXPECT_EQ(task_report_text(analysis), std::string("SIMULATED PARTICIPANTS\n\n") + kLogisticText);
@@ -146,7 +146,7 @@ TEST(TaskText, GroupResultsSayWhoWasLeftOut) {
       {"point", {{"A", 1}, {"B", 2}}, 1, 0.25, 0.5, Interval{0.125, 0.5}, false, 0, {}},
       {"ray", {{"A", 1}}, 0, 0.75, {}, {}, false, 0, {}},
       {"other", {}, 2, {}, {}, {}, false, 0, {}}};
-  TaskAnalysis analysis;
+  StudyAnalysis analysis;
   analysis.groups = {group};
   EXPECT_EQ(
       task_report_text(analysis),
@@ -278,7 +278,7 @@ TEST(TaskText, ATableThatSaysNothingOfItsScaleIsPointedOut) {
   const std::string note =
       "A table does not contain the scale of an adaptive procedure's levels: if it "
       "is\nlogarithmic, give --scale log.\n";
-  TaskAnalysis analysis;
+  StudyAnalysis analysis;
   analysis.cells = {named_cell("detect", "", "", "ray")};
   const auto is_noted = [&] {
     return task_report_text(analysis).find(kLogisticText + note) != std::string::npos;
@@ -304,7 +304,7 @@ TEST(TaskText, ATableThatSaysNothingOfItsScaleIsPointedOut) {
 }
 
 std::string text_of_comparison(const TaskComparison& one, bool of_renderers) {
-  TaskAnalysis analysis;
+  StudyAnalysis analysis;
   (of_renderers ? analysis.renderers : analysis.conditions).push_back(one);
   const std::string text = task_report_text(analysis);
   return text.substr(0, std::min(text.find("To quote"), text.find("Intervals are")));
@@ -385,7 +385,7 @@ TEST(TaskText, RatingsHaveAWilcoxonTestWithItsWarning) {
   EXPECT_NE(text_of_comparison(one, false)
                 .find("V = 15, p = 0.062 (5 or fewer differ: p cannot be below 0.05)"),
             std::string::npos);
-  TaskAnalysis analysis;
+  StudyAnalysis analysis;
   analysis.table.simulated = true;
   analysis.conditions = {one};
   const std::string text = task_report_text(analysis);
@@ -398,7 +398,7 @@ TEST(TaskText, RatingsHaveAWilcoxonTestWithItsWarning) {
 }
 
 TEST(TaskText, RatioOfTheGroupHasItsInterval) {
-  TaskAnalysis analysis;
+  StudyAnalysis analysis;
   TaskGroupComparison& one = analysis.group_models.comparisons.emplace_back();
   one.task = "compare";
   one.measure = "jnd";

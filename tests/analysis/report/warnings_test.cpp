@@ -24,7 +24,7 @@ Analysis analysis_in(const Order& order, const Time& time) {
     for (const std::string& renderer : order(p)) {
       const bool first = number == 0;
       for (int i = 0; i < 5; ++i) {
-        RawTrial raw;
+        StudyTrial raw;
         raw.participant = name;
         raw.renderer = renderer;
         raw.shape = raw.response = "cone";

@@ -89,14 +89,14 @@ TrialTable table_of(const std::vector<Row>& rows) {
   for (const char* renderer : {"point", "ray"}) {  // the order of renderers
     for (const Row& row : rows) {
       if (row.renderer != renderer) continue;
-      RawTrial raw;
+      StudyTrial raw;
       raw.participant = row.participant;
       raw.renderer = row.renderer;
       raw.shape = "cone";
       raw.trial = ++trial;
       raw.timed_out = row.timed_out;
       raw.correct = !row.timed_out;
-      if (raw.correct) raw.response = "cone";
+      if (*raw.correct) raw.response = "cone";
       raw.response_time = row.time;
       builder.add(raw);
     }

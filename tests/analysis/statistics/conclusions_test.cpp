@@ -19,7 +19,7 @@ namespace palpate::analysis {
 namespace {
 
 /// Modifies a trial, by default a correct answer after 5 s; returns false to leave it out.
-using Change = std::function<bool(int participant, int repetition, RawTrial& trial)>;
+using Change = std::function<bool(int participant, int repetition, StudyTrial& trial)>;
 
 /// Sphere and cone with both renderers, point first, shapes alternating.
 Analysis analysis_with(int participants, int repetitions, const Change& change) {
@@ -29,7 +29,7 @@ Analysis analysis_with(int participants, int repetitions, const Change& change) 
     for (const std::string renderer : {"point", "ray"}) {
       for (int i = 0; i < repetitions; ++i) {
         for (const std::string shape : {"sphere", "cone"}) {
-          RawTrial raw;
+          StudyTrial raw;
           const std::string name = "P" + std::to_string(p);
           raw.participant = name;
           raw.renderer = renderer;
@@ -51,13 +51,13 @@ bool warns(const Analysis& analysis, const std::string& of) {
       [&](const std::string& warning) { return warning.find(of) != std::string::npos; });
 }
 
-void answer_wrongly(RawTrial& trial) {
+void answer_wrongly(StudyTrial& trial) {
   trial.response = trial.shape == "cone" ? "sphere" : "cone";
   trial.correct = false;
 }
 
 TEST(Exclusions, AreCountedByTheirReason) {
-  const Analysis analysis = analysis_with(2, 10, [](int, int i, RawTrial& trial) {
+  const Analysis analysis = analysis_with(2, 10, [](int, int i, StudyTrial& trial) {
     if (trial.renderer == "point" || trial.shape == "sphere") return true;
     if (i < 2) answer_wrongly(trial);
     if (i == 1 || i == 2) trial.response_time = 0.1;  // a wrong and a correct one
@@ -79,7 +79,7 @@ TEST(Exclusions, AreCountedByTheirReason) {
 
 TEST(Exclusions, AboveTenPercentAreWarnedOf) {
   const auto with_wrong = [](int of_25) {
-    return analysis_with(2, 50, [=](int, int i, RawTrial& trial) {
+    return analysis_with(2, 50, [=](int, int i, StudyTrial& trial) {
       if (i % 25 < of_25) answer_wrongly(trial);
       return true;
     });
@@ -87,7 +87,7 @@ TEST(Exclusions, AboveTenPercentAreWarnedOf) {
   EXPECT_TRUE(warns(with_wrong(3), "12.0 % of the trials with point are excluded from the times"));
   EXPECT_TRUE(warns(with_wrong(3), "12.0 % of the trials with ray are excluded from the times"));
   EXPECT_FALSE(warns(with_wrong(2), "are excluded from the times (wrong"));
-  const Analysis limit = analysis_with(2, 10, [](int, int i, RawTrial& trial) {
+  const Analysis limit = analysis_with(2, 10, [](int, int i, StudyTrial& trial) {
     if (i == 0) answer_wrongly(trial);
     return true;
   });
@@ -96,13 +96,13 @@ TEST(Exclusions, AboveTenPercentAreWarnedOf) {
 
 TEST(Exclusions, ThatDifferAreWarnedOfWhicheverHasMore) {
   for (const char* more : {"point", "ray"}) {
-    const Analysis analysis = analysis_with(2, 20, [&](int, int i, RawTrial& trial) {
+    const Analysis analysis = analysis_with(2, 20, [&](int, int i, StudyTrial& trial) {
       if (trial.renderer == more && i < 2) answer_wrongly(trial);
       return true;
     });
     EXPECT_TRUE(warns(analysis, "Exclusions differ between renderers")) << more;
   }
-  const Analysis equal = analysis_with(2, 20, [&](int, int i, RawTrial& trial) {
+  const Analysis equal = analysis_with(2, 20, [&](int, int i, StudyTrial& trial) {
     if (i < 2) answer_wrongly(trial);
     return true;
   });
@@ -110,7 +110,7 @@ TEST(Exclusions, ThatDifferAreWarnedOfWhicheverHasMore) {
 }
 
 TEST(DroppedParticipant, AreNamedWithTheRendererThatIsMissing) {
-  const Analysis analysis = analysis_with(4, 3, [](int p, int, RawTrial& trial) {
+  const Analysis analysis = analysis_with(4, 3, [](int p, int, StudyTrial& trial) {
     return (p != 1 || trial.renderer == "ray") && (p != 2 || trial.renderer == "point");
   });
   for (const PairedShape& shape : analysis.comparisons[0].shapes) {
@@ -124,7 +124,7 @@ TEST(DroppedParticipant, AreNamedWithTheRendererThatIsMissing) {
 
 TEST(Anova, IsUndefinedWhereEveryEffectIs) {
   // Effects are equal in all participants: the denominator of F is 0.
-  const Analysis flat = analysis_with(4, 2, [](int p, int, RawTrial& trial) {
+  const Analysis flat = analysis_with(4, 2, [](int p, int, StudyTrial& trial) {
     trial.response_time = std::exp(1 + 0.3 * p + (trial.renderer == "ray" ? -0.2 : 0) +
                                    (trial.shape == "cone" ? 0.5 : 0));
     return true;
@@ -135,7 +135,7 @@ TEST(Anova, IsUndefinedWhereEveryEffectIs) {
     EXPECT_FALSE(effect.generalized_eta_squared.has_value()) << effect.name;
   }
   // A single effect without variance does not affect the others.
-  const Analysis one = analysis_with(4, 2, [](int p, int, RawTrial& trial) {
+  const Analysis one = analysis_with(4, 2, [](int p, int, StudyTrial& trial) {
     trial.response_time =
         std::exp(1 + (trial.renderer == "ray" ? -0.2 : 0) + (trial.shape == "cone" ? 0.1 * p : 0));
     return true;
@@ -148,20 +148,21 @@ TEST(Anova, IsUndefinedWhereEveryEffectIs) {
 
 /// Cones with the point take 40 s and more, with time-outs at 60 s: their number by participant.
 Analysis with_time_outs(const std::vector<int>& timed_out) {
-  return analysis_with(static_cast<int>(timed_out.size()), 20, [&](int p, int i, RawTrial& trial) {
-    trial.response_time = std::exp(2 + 0.05 * p + 0.3 * std::sin(3.7 * i + p) +
-                                   (trial.renderer == "ray" ? 0.1 * (p % 2) : 0));
-    if (trial.shape == "cone" && trial.renderer == "point") {
-      trial.response_time *= 3;
-      if (i < timed_out[static_cast<std::size_t>(p)]) {
-        trial.response_time = 60;
-        trial.response = "";
-        trial.timed_out = true;
-        trial.correct = false;
-      }
-    }
-    return true;
-  });
+  return analysis_with(
+      static_cast<int>(timed_out.size()), 20, [&](int p, int i, StudyTrial& trial) {
+        trial.response_time = std::exp(2 + 0.05 * p + 0.3 * std::sin(3.7 * i + p) +
+                                       (trial.renderer == "ray" ? 0.1 * (p % 2) : 0));
+        if (trial.shape == "cone" && trial.renderer == "point") {
+          *trial.response_time *= 3;
+          if (i < timed_out[static_cast<std::size_t>(p)]) {
+            trial.response_time = 60;
+            trial.response = "";
+            trial.timed_out = true;
+            trial.correct = false;
+          }
+        }
+        return true;
+      });
 }
 
 TEST(TimeOuts, AreSaidOfTheCellThatHasThem) {
@@ -237,7 +238,7 @@ TEST(Answer, HasASentenceForEachComparison) {
 }
 
 TEST(SpeedAccuracy, ReadsSlowerAndBetterAsATradeOffToo) {
-  const Analysis analysis = analysis_with(3, 10, [](int p, int i, RawTrial& trial) {
+  const Analysis analysis = analysis_with(3, 10, [](int p, int i, StudyTrial& trial) {
     if (trial.renderer == "ray") trial.response_time = 6;
     if (trial.renderer == "point" && i < 2 + p) answer_wrongly(trial);
     return true;
@@ -248,7 +249,7 @@ TEST(SpeedAccuracy, ReadsSlowerAndBetterAsATradeOffToo) {
 
 TEST(Learning, DiffersBetweenRenderersAsRayLessPoint) {
   // Log times fall by 1 % of a unit a trial with the point, by 3 % and more with the ray.
-  const Analysis analysis = analysis_with(3, 16, [](int p, int i, RawTrial& trial) {
+  const Analysis analysis = analysis_with(3, 16, [](int p, int i, StudyTrial& trial) {
     const int number = 2 * i + (trial.shape == "cone" ? 1 : 0);
     const double slope = trial.renderer == "point" ? -0.01 : -0.03 - 0.01 * p;
     trial.response_time = std::exp(2 + slope * number);
@@ -263,7 +264,7 @@ TEST(Learning, DiffersBetweenRenderersAsRayLessPoint) {
 
 TEST(RendererOrder, OfAllShapesTakesWhoHasThemAll) {
   const Analysis analysis = analysis_with(
-      4, 3, [](int p, int, RawTrial& trial) { return p != 3 || trial.shape == "cone"; });
+      4, 3, [](int p, int, StudyTrial& trial) { return p != 3 || trial.shape == "cone"; });
   const auto of = [&](const OrderEffect& effect) { return effect.reference_first.n_participants; };
   EXPECT_EQ(of(analysis.practice.pairs[0].shapes[0]), 3U);
   EXPECT_EQ(of(analysis.practice.pairs[0].shapes[1]), 4U);
@@ -285,17 +286,17 @@ TEST(SingularFit, IsNamedByWhatDoesNotVary) {
   };
   // The same alternating noise for all: participants vary less than by chance.
   const auto noise = [](int i) { return i % 2 == 0 ? 0.3 : -0.3; };
-  EXPECT_EQ(singular([&](int, int i, RawTrial& trial) {
+  EXPECT_EQ(singular([&](int, int i, StudyTrial& trial) {
               trial.response_time = std::exp(2 + noise(i));
               return true;
             }),
             "participants' intercepts do not vary; participants' slopes for ray do not vary");
-  EXPECT_EQ(singular([&](int p, int i, RawTrial& trial) {
+  EXPECT_EQ(singular([&](int p, int i, StudyTrial& trial) {
               trial.response_time = std::exp(2 + 0.5 * p + noise(i));
               return true;
             }),
             "participants' slopes for ray do not vary");
-  EXPECT_EQ(singular([&](int p, int i, RawTrial& trial) {
+  EXPECT_EQ(singular([&](int p, int i, StudyTrial& trial) {
               const double gain = trial.renderer == "ray" ? 1.5 : 1;
               trial.response_time = std::exp(2 + 0.5 * p * gain + noise(i));
               return true;
@@ -353,7 +354,7 @@ TEST(Plan, AsksForTheGoalThatIsSet) {
 }
 
 TEST(Pilot, LeavesOutOfTheShareWhatIsTooFast) {
-  const Analysis analysis = analysis_with(4, 8, [](int p, int i, RawTrial& trial) {
+  const Analysis analysis = analysis_with(4, 8, [](int p, int i, StudyTrial& trial) {
     trial.response_time = std::exp(2 + 0.1 * p + 0.1 * ((i * i + p) % 5) +
                                    (trial.renderer == "ray" ? 0.07 * (p % 3) : 0));
     if (i == 0) trial.response_time = 0.1;

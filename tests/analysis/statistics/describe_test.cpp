@@ -12,10 +12,10 @@
 namespace palpate::analysis {
 namespace {
 
-TrialTable table_of(const std::vector<RawTrial>& trials) {
+TrialTable table_of(const std::vector<StudyTrial>& trials) {
   TrialTableBuilder builder;
   int number = 0;
-  for (RawTrial trial : trials) {
+  for (StudyTrial trial : trials) {
     trial.participant = "P1";
     trial.renderer = "ray";
     trial.shape = "cone";
@@ -25,16 +25,16 @@ TrialTable table_of(const std::vector<RawTrial>& trials) {
   return builder.finish({});
 }
 
-RawTrial answered(const char* response, double time) {
-  RawTrial trial;
+StudyTrial answered(const char* response, double time) {
+  StudyTrial trial;
   trial.response = response;
   trial.correct = trial.response == "cone";
   trial.response_time = time;
   return trial;
 }
 
-RawTrial time_out() {
-  RawTrial trial = answered("", 60);
+StudyTrial time_out() {
+  StudyTrial trial = answered("", 60);
   trial.timed_out = true;
   return trial;
 }
@@ -50,7 +50,7 @@ TEST(Describe, TheLimitItselfIsKept) {
 }
 
 TEST(Describe, TimeOutsAreWrongAndNoResponse) {
-  RawTrial claims = time_out();
+  StudyTrial claims = time_out();
   claims.correct = true;
   const Description found =
       describe(table_of({time_out(), claims, answered("cone", 2), answered("cube", 0.1)}), 0.2);

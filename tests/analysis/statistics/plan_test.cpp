@@ -182,7 +182,7 @@ Analysis pilot_study(double gain_sd, double shape_gain_sd, double residual_sd, s
       const double own = shape_gain_sd * random.normal();
       for (const std::string renderer : {"point", "ray"}) {
         for (int i = 0; i < 15; ++i) {
-          RawTrial raw;
+          StudyTrial raw;
           raw.participant = name;
           raw.renderer = renderer;
           raw.shape = raw.response = shape;
@@ -234,7 +234,7 @@ Analysis uneven_pilot(bool one_more, const std::string& missing_with = "ray") {
         const bool empty = p == 8 && shape == "cone" && renderer == missing_with;
         const std::string response = empty ? "other" : shape;
         for (int i = 0; i < 6; ++i) {
-          RawTrial raw;
+          StudyTrial raw;
           raw.participant = name;
           raw.renderer = renderer;
           raw.shape = shape;

@@ -32,7 +32,7 @@ Analysis analysis_of(const std::vector<Participant>& participants) {
   for (const Participant& participant : participants) {
     for (const std::string renderer : {"point", "ray"}) {
       for (int i = 0; i < kTrials; ++i) {
-        RawTrial raw;
+        StudyTrial raw;
         raw.participant = participant.name;
         raw.renderer = renderer;
         raw.shape = i % 2 == 0 ? "cone" : "cube";
@@ -141,7 +141,7 @@ Analysis study_without_learning(Random& random) {
     const std::string name(1, static_cast<char>('A' + p));
     for (int i = 0; i < 2 * kTrials; ++i) {
       const bool ray = (i < kTrials) == (p % 2 == 0);
-      RawTrial raw;
+      StudyTrial raw;
       raw.participant = name;
       raw.renderer = ray ? "ray" : "point";
       raw.shape = raw.response = i % 2 == 0 ? "cone" : "cube";
@@ -196,7 +196,7 @@ TEST(Learning, SaysNothingOfFewTrials) {
     for (const std::string renderer : {"point", "ray"}) {
       // With the ray one trial too few for a slope.
       for (std::size_t i = 0; i < kSlopeTrials - (renderer == "ray" ? 1 : 0); ++i) {
-        RawTrial raw;
+        StudyTrial raw;
         raw.participant = who;
         raw.renderer = renderer;
         raw.shape = raw.response = "cone";
@@ -280,15 +280,15 @@ double share_of_trade_offs(int studies, double loss, double time_outs, double ga
         for (int i = 0; i < 20; ++i) {
           const bool ray = i % 2 == 0;
           const std::string person = "P" + std::to_string(p), renderer = ray ? "ray" : "point";
-          RawTrial raw;
+          StudyTrial raw;
           raw.participant = person;
           raw.renderer = renderer;
           raw.shape = shape;
           raw.timed_out = random.unit() < time_outs;
           raw.correct = !raw.timed_out && random.unit() < ability - (ray ? loss : 0);
-          raw.response = raw.timed_out ? std::string_view()
-                         : raw.correct ? std::string_view(shape)
-                                       : "other";
+          raw.response = raw.timed_out  ? std::string()
+                         : *raw.correct ? std::string(shape)
+                                        : "other";
           raw.trial = ++trial;
           raw.response_time =
               raw.timed_out ? 30 : std::exp(2 + (ray ? own_gain : 0) + 0.4 * random.normal());

@@ -63,13 +63,13 @@ TEST(Ratings, FewWholeNumbersAreSteps) {
 }
 
 /// A study of ratings: numbers[person][stimulus] with each renderer, one rating each.
-TaskTable rated(const std::vector<std::vector<double>>& point,
-                const std::vector<std::vector<double>>& ray, std::optional<double> level = {}) {
-  TaskTable table;
+StudyTable rated(const std::vector<std::vector<double>>& point,
+                 const std::vector<std::vector<double>>& ray, std::optional<double> level = {}) {
+  StudyTable table;
   const auto add = [&](const std::vector<std::vector<double>>& numbers, const char* renderer) {
     for (std::size_t p = 0; p < numbers.size(); ++p) {
       for (std::size_t s = 0; s < numbers[p].size(); ++s) {
-        TaskTrial& trial = table.trials.emplace_back();
+        StudyTrial& trial = table.trials.emplace_back();
         trial.participant = "P" + std::to_string(p);
         trial.task = "rate";
         trial.block_name = "rough";
@@ -88,7 +88,7 @@ TaskTable rated(const std::vector<std::vector<double>>& point,
 
 // In R: t.test(c(2, 1, 3, 2, 1, 4)), wilcox.test() of the same values: V = 21, p = 0.03125.
 TEST(RatedStimuli, AreComparedWithEachOther) {
-  const TaskAnalysis analysis = analyze_tasks(
+  const StudyAnalysis analysis = analyze_study(
       rated({{1, 3, 2}, {2, 3, 4}, {1, 4, 2}, {2, 4, 1}, {3, 4, 3}, {1, 5, 2}}, {}), {});
   ASSERT_EQ(analysis.cells.size(), 3U);
   EXPECT_TRUE(analysis.renderers.empty());
@@ -116,7 +116,7 @@ TEST(RatedStimuli, AreComparedWithEachOther) {
 
 TEST(RatedStimuli, HaveRenderersComparedOverAllOfABlock) {
   const std::vector<std::vector<double>> point{{1, 3}, {2, 3}, {1, 4}}, ray{{3, 3}, {5, 4}, {4, 4}};
-  const TaskAnalysis analysis = analyze_tasks(rated(point, ray), {});
+  const StudyAnalysis analysis = analyze_study(rated(point, ray), {});
   ASSERT_EQ(analysis.renderers.size(), 2U);
   for (const TaskComparison& one : analysis.renderers) {
     EXPECT_EQ(one.measure, "rating");
@@ -129,27 +129,28 @@ TEST(RatedStimuli, HaveRenderersComparedOverAllOfABlock) {
 }
 
 TEST(RatedStimuli, OfOtherBlocksHaveOtherQuestions) {
-  TaskTable table = rated({{1, 3}, {2, 4}, {1, 5}}, {});
-  for (TaskTrial& trial : table.trials) trial.block_name = trial.shape == "silk" ? "rough" : "warm";
-  EXPECT_TRUE(analyze_tasks(std::move(table), {}).conditions.empty());
+  StudyTable table = rated({{1, 3}, {2, 4}, {1, 5}}, {});
+  for (StudyTrial& trial : table.trials)
+    trial.block_name = trial.shape == "silk" ? "rough" : "warm";
+  EXPECT_TRUE(analyze_study(std::move(table), {}).conditions.empty());
 }
 
 TEST(RatedLevels, HaveAPowerLawOnlyWithoutLabels) {
   const std::vector<std::vector<double>> numbers{{1, 3}, {2, 3}};
-  const TaskAnalysis free = analyze_tasks(rated(numbers, {}, 4), {});
+  const StudyAnalysis free = analyze_study(rated(numbers, {}, 4), {});
   EXPECT_TRUE(free.cells[0].magnitude.has_value());
   EXPECT_FALSE(free.cells[0].ratings.has_value());
-  TaskTable labelled = rated(numbers, {}, 4);
-  for (TaskTrial& trial : labelled.trials) trial.response = *trial.number == 1 ? "soft" : "hard";
-  const TaskAnalysis steps = analyze_tasks(labelled, {});
+  StudyTable labelled = rated(numbers, {}, 4);
+  for (StudyTrial& trial : labelled.trials) trial.response = *trial.number == 1 ? "soft" : "hard";
+  const StudyAnalysis steps = analyze_study(labelled, {});
   EXPECT_FALSE(steps.cells[0].magnitude.has_value());
   ASSERT_TRUE(steps.cells[0].ratings.has_value());
   EXPECT_EQ(steps.cells[0].ratings->steps.at(0).label, "soft");
   // With the protocol its steps count, also those that nobody chose.
-  TaskTable stored = rated(numbers, {}, 4);
-  for (TaskTrial& trial : stored.trials) trial.protocol_sha256 = "ab";
+  StudyTable stored = rated(numbers, {}, 4);
+  for (StudyTrial& trial : stored.trials) trial.protocol_sha256 = "ab";
   stored.procedures["ab"]["rough"].rating_steps = {{1, "soft"}, {2, "middle"}, {3, "hard"}};
-  const TaskAnalysis known = analyze_tasks(std::move(stored), {});
+  const StudyAnalysis known = analyze_study(std::move(stored), {});
   ASSERT_TRUE(known.cells[0].ratings.has_value());
   EXPECT_EQ(known.cells[0].ratings->steps.size(), 3U);
   EXPECT_FALSE(known.cells[0].magnitude.has_value());

@@ -12,17 +12,17 @@ namespace {
 
 /// The reversals of one track, from levels and answers ('+' a success).
 std::vector<std::size_t> reversals(const std::vector<double>& levels, const std::string& answers) {
-  TaskTable table;
+  StudyTable table;
   for (std::size_t i = 0; i < levels.size(); ++i) {
-    TaskTrial trial;
+    StudyTrial trial;
     trial.track = "1";
     trial.level = levels[i];
     trial.success = answers[i] == '+';
     trial.answered = true;
     table.trials.push_back(trial);
   }
-  std::vector<const TaskTrial*> trials;
-  for (const TaskTrial& trial : table.trials) trials.push_back(&trial);
+  std::vector<const StudyTrial*> trials;
+  for (const StudyTrial& trial : table.trials) trials.push_back(&trial);
   return tracks_of(trials, table).at(0).reversals;
 }
 
@@ -48,16 +48,16 @@ TEST(Tracks, ThatDoNotFollowTheAnswersDoNotReverse) {
 TEST(Tracks, OfConstantLevelsDoNotReverse) { EXPECT_EQ(reversals({5, 5, 5}, "+-+"), Answers()); }
 
 TEST(Tracks, LeaveOutWhatWasNotAnsweredAndCatchTrials) {
-  TaskTable table;
+  StudyTable table;
   for (const double level : {5.0, 9.0, 4.0, 9.0, 3.0}) {
-    TaskTrial trial;
+    StudyTrial trial;
     trial.level = level;
     trial.answered = level < 9 || table.trials.size() > 1;
     trial.catch_trial = level == 9 && trial.answered;
     table.trials.push_back(trial);
   }
-  std::vector<const TaskTrial*> trials;
-  for (const TaskTrial& trial : table.trials) trials.push_back(&trial);
+  std::vector<const StudyTrial*> trials;
+  for (const StudyTrial& trial : table.trials) trials.push_back(&trial);
   EXPECT_EQ(tracks_of(trials, table).at(0).levels, (std::vector<double>{5, 4, 3}));
 }
 

@@ -60,7 +60,7 @@ void expect_order(const json& block, std::size_t kinds, int of_each, std::size_t
     std::map<Kind, int> counts;
     std::map<std::pair<int, RendererKind>, int> tracks;
     std::vector<Kind> order;
-    for (const Trial& trial : worked_off(TaskPlan(protocol, participant, 1))) {
+    for (const Trial& trial : worked_off(SessionPlan(protocol, participant, 1))) {
       const Kind kind = kind_of(trial);
       ++counts[kind];
       order.push_back(kind);

@@ -1,9 +1,11 @@
 // Procedures read from a stored text are those of the recorded session.
 
+#include "protocols/tasks/block_procedures.h"
+
 #include <gtest/gtest.h>
 
+#include "protocols/session_plan.h"
 #include "protocols/tasks/levels.h"
-#include "protocols/tasks/task_plan.h"
 #include "tests/protocols/tasks/task_study.h"
 
 namespace palpate::protocols {
@@ -27,7 +29,7 @@ TEST(BlockProcedures, GiveTheEstimatesOfTheSessionsTracks) {
   ASSERT_EQ(blocks.size(), 4U);
   std::size_t compared = 0;
   for (const int participant : {1, 3, 8}) {
-    TaskPlan plan(protocol, participant, 1);
+    SessionPlan plan(protocol, participant, 1);
     std::map<std::pair<int, int>, std::vector<Response>> answers;
     std::map<std::pair<int, int>, Estimate> estimates;
     while (!plan.finished()) {

@@ -50,7 +50,7 @@ void expect_equal_trials(const SameStudy& study) {
   const Protocol one = parsed(study.one), two = parsed(study.two);
   for (const int participant : {1, 2, 7}) {
     const std::vector<Trial> expected = schedule(one, participant);
-    const std::vector<Trial> found = worked_off(TaskPlan(two, participant, 1));
+    const std::vector<Trial> found = worked_off(SessionPlan(two, participant, 1));
     ASSERT_EQ(found.size(), expected.size());
     for (std::size_t i = 0; i < found.size(); ++i) {
       const Trial &a = expected[i], &b = found[i];
@@ -66,20 +66,20 @@ void expect_equal_trials(const SameStudy& study) {
   }
 }
 
-TEST(TaskPlan, IdentifiesInTheOrderOfVersion1) {
+TEST(SessionPlan, IdentifiesInTheOrderOfVersion1) {
   for (const char* orientation :
        {R"("uniform")", R"("fixed")", "[[1, 0, 0, 0], [0, 1, 0, 0], [0, 0, 0, 1]]"})
     expect_equal_trials(identification(orientation));
 }
 
-TEST(TaskPlan, IdentifiesUnderTheLimitsOfVersion1) {
+TEST(SessionPlan, IdentifiesUnderTheLimitsOfVersion1) {
   SameStudy study = identification(R"("uniform")");
   study.one["order"] = {{"max_run", 2}};
   for (json& block : study.two["blocks"]) block["order"] = {{"max_run", 2}};
   expect_equal_trials(study);
 }
 
-TEST(TaskPlan, IdentifiesWithPracticeAndSeveralBlocksAsInVersion1) {
+TEST(SessionPlan, IdentifiesWithPracticeAndSeveralBlocksAsInVersion1) {
   SameStudy study = identification(R"("uniform")");
   study.one["repetitions"] = 10;
   study.one["blocks_per_renderer"] = 2;
@@ -103,7 +103,7 @@ TEST(TaskPlan, IdentifiesWithPracticeAndSeveralBlocksAsInVersion1) {
   expect_equal_trials(study);
 }
 
-TEST(TaskPlan, IdentifiesWithMixedRenderersAsInVersion1) {
+TEST(SessionPlan, IdentifiesWithMixedRenderersAsInVersion1) {
   SameStudy study = identification(R"("uniform")");
   study.one["renderer_order"] = "interleaved";
   json mixed = study.two["blocks"][0];
@@ -112,13 +112,13 @@ TEST(TaskPlan, IdentifiesWithMixedRenderersAsInVersion1) {
   expect_equal_trials(study);
 }
 
-TEST(TaskPlan, IdentifiesSomeOfTheStimuli) {
+TEST(SessionPlan, IdentifiesSomeOfTheStimuli) {
   SameStudy study = identification(R"("uniform")");
   json& block = study.two["blocks"][0];
   block["stimuli"] = {"cube", "sphere"};
   block["keys"] = {{"1", "sphere"}, {"3", "cube"}};
   std::map<int, int> shown;
-  for (const Trial& trial : worked_off(TaskPlan(parsed(study.two), 1, 1))) {
+  for (const Trial& trial : worked_off(SessionPlan(parsed(study.two), 1, 1))) {
     if (trial.task_block == 0) ++shown[trial.stimulus];
   }
   EXPECT_EQ(shown, (std::map<int, int>{{0, 5}, {2, 5}}));

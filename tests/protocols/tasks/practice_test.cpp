@@ -6,6 +6,7 @@
 #include <set>
 #include <string>
 
+#include "protocols/tasks/block_order.h"
 #include "tests/protocols/tasks/task_study.h"
 
 namespace palpate::protocols {
@@ -29,7 +30,7 @@ Protocol practised(const char* criterion, int limit) {
 /// Answers right or wrong as given, then right.
 /// \return trials of practice
 std::vector<Trial> practice_of(const Protocol& protocol, const std::string& answers) {
-  TaskPlan plan(protocol, 1, 1);
+  SessionPlan plan(protocol, 1, 1);
   std::vector<Trial> shown;
   while (plan.next().practice) {
     const std::size_t at = shown.size();

@@ -7,7 +7,7 @@
 
 #include "data/base/random.h"
 #include "protocols/parse.h"
-#include "protocols/tasks/task_plan.h"
+#include "protocols/session_plan.h"
 
 namespace palpate::protocols {
 
@@ -48,7 +48,7 @@ inline TrialOutcome answer_to(const Trial& trial) {
   return {success, success, random.unit() > 0.05};
 }
 
-inline std::vector<Trial> worked_off(TaskPlan plan) {
+inline std::vector<Trial> worked_off(SessionPlan plan) {
   std::vector<Trial> trials;
   while (!plan.finished()) {
     trials.push_back(plan.next());

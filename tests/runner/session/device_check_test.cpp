@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "protocols/parse.h"
+#include "protocols/schedule.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::runner::session {
@@ -35,6 +36,7 @@ protocols::Protocol some_protocol(const stimuli::Material& material) {
   stimulus.object.subdivisions = 1;
   stimulus.object.material = material;
   protocol.stimuli = {stimulus};
+  protocol.blocks = {protocols::shapes_block(protocol)};
   return protocol;
 }
 

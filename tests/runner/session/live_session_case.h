@@ -141,9 +141,9 @@ class LiveSessions : public ::testing::Test {
     data::RunInfo info;
     info.program_version = "0.0.0";
     info.device = "fake";
-    SessionPlan plan(protocol_, participant_.number, 1);
+    protocols::SessionPlan plan(protocol_, participant_.number, 1);
     for (const data::TrialRecord& r : store_->progress(participant_, 1).completed)
-      plan.answered(r.correct);
+      plan.answered({r.correct, r.correct});
     std::vector<std::unique_ptr<MarkerSink>> sinks;
     sinks.push_back(std::make_unique<Collected>(markers_));
     Markers markers(std::move(sinks));

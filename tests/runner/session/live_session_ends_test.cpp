@@ -45,7 +45,7 @@ TEST_F(LiveSessions, AWithdrawalCountsInEveryStateAndSpelling) {
   protocol_.texts.break_text = "have a rest";
   protocol_.breaks.every_trials = 1;
   protocol_.breaks.min_seconds = 0.05;
-  protocol_.response.feedback = true;
+  protocol_.blocks.front().feedback = true;
   protocol_.texts.end = "that was all";
   const std::vector<std::string> texts = {"withdrawn", "Withdrawn", "WITHDRAWN.",
                                           "she withdrew, feels sick"};
@@ -75,7 +75,7 @@ TEST_F(LiveSessions, AWithdrawalCountsInEveryStateAndSpelling) {
 }
 
 TEST_F(LiveSessions, AnEndDuringTheFeedbackKeepsTheAnswer) {
-  protocol_.response.feedback = true;
+  protocol_.blocks.front().feedback = true;
   FakeDevice device([](int) { return at(0.1); });
   screen_.on_feedback = [&] { console_.next = {{display::ConsoleCommand::Kind::quit, "", 0}}; };
   const LiveSession::Outcome outcome = run(device);

@@ -67,10 +67,10 @@ struct SessionBench {
   servo::Servo servo{device, clock, protocol.servo_rate, servo::ForceLimits{}};
   MemoryLog log;
 
-  Session session(participants::Respondent& respondent, SessionPlan plan) {
+  Session session(participants::Respondent& respondent, protocols::SessionPlan plan) {
     return session(respondent, std::move(plan), servo);
   }
-  Session session(participants::Respondent& respondent, SessionPlan plan,
+  Session session(participants::Respondent& respondent, protocols::SessionPlan plan,
                   servo::TickSource& another_servo) {
     return {{protocol, library, std::move(plan), another_servo, clock, {0, 0}, log}, respondent};
   }

@@ -41,7 +41,8 @@ TEST(Session, TheServosVerdictIsInTheTrialsRecord) {
     servo.verdict.max_force = 3.5;
     servo.verdict.faults = faults;
     ScriptedRespondent respondent({});
-    Session session = bench.session(respondent, SessionPlan(bench.protocol, 1, 1), servo);
+    Session session =
+        bench.session(respondent, protocols::SessionPlan(bench.protocol, 1, 1), servo);
     run(session);
     for (const data::TrialRecord& record : bench.log.finished) {
       EXPECT_EQ(record.started_inside, faults == rendering::render_fault::kStartedInside);
@@ -102,7 +103,7 @@ TEST(Session, ATrialKeepsEverySampleAndItsInitialFacts) {
   bench.protocol.samples = true;
   Numbered servo;
   ScriptedRespondent respondent({});
-  Session session = bench.session(respondent, SessionPlan(bench.protocol, 1, 1), servo);
+  Session session = bench.session(respondent, protocols::SessionPlan(bench.protocol, 1, 1), servo);
   while (bench.log.finished.empty()) session.step();
   const data::TrialRecord& record = bench.log.finished[0];
   ASSERT_EQ(record.samples.size(), 301u);  // answered at tick 300

@@ -18,7 +18,7 @@ using runner::testing::FakeDevice;
 TEST(Session, RunsPracticeBlocksBreaksAndEnd) {
   SessionBench bench;
   ScriptedRespondent respondent({});
-  Session session = bench.session(respondent, SessionPlan(bench.protocol, 1, 1));
+  Session session = bench.session(respondent, protocols::SessionPlan(bench.protocol, 1, 1));
   run(session);
   // Practice of 2, then blocks of 2. A rest comes between blocks, not after practice. Practice does
   // not count in the three trials until a break either.
@@ -42,7 +42,7 @@ TEST(Session, ABreakIsDueAfterItsNumberOfTrialsOfTheBlock) {
   bench.protocol.blocks_per_renderer = 1;
   bench.protocol.repetitions = 4;  // 2 of practice, then 8 for each renderer
   ScriptedRespondent respondent({});
-  Session session = bench.session(respondent, SessionPlan(bench.protocol, 1, 1));
+  Session session = bench.session(respondent, protocols::SessionPlan(bench.protocol, 1, 1));
   run(session);
   std::vector<std::size_t> after;  // number of trials before each break
   const auto& finished = bench.log.finished;
@@ -58,7 +58,7 @@ TEST(Session, ABreakIsDueAfterItsNumberOfTrialsOfTheBlock) {
 TEST(Session, TimeOutIsWrongWithTheLimitAsItsTime) {
   SessionBench bench;
   ScriptedRespondent respondent({1, 1, -1});
-  Session session = bench.session(respondent, SessionPlan(bench.protocol, 1, 1));
+  Session session = bench.session(respondent, protocols::SessionPlan(bench.protocol, 1, 1));
   run(session);
   const data::TrialRecord& record = bench.log.finished[2];
   EXPECT_TRUE(record.timed_out);
@@ -75,7 +75,7 @@ TEST(Session, PracticeIsRepeatedUntilTheCriterionOrTheLastRound) {
   for (const auto& [right, trials] : cases) {
     SessionBench bench;
     ScriptedRespondent respondent(right);
-    Session session = bench.session(respondent, SessionPlan(bench.protocol, 1, 1));
+    Session session = bench.session(respondent, protocols::SessionPlan(bench.protocol, 1, 1));
     run(session);
     ASSERT_EQ(bench.log.finished.size(), trials);
     for (std::size_t i = 0; i < trials; ++i) {
@@ -89,13 +89,14 @@ TEST(Session, ResumesAtTheFirstTrialWithoutARecordWhereverItStopped) {
   const std::deque<int> script = {0, 1, 1, 1, 0, -1, 1, 0};
   SessionBench whole;
   ScriptedRespondent respondent(script);
-  Session session = whole.session(respondent, SessionPlan(whole.protocol, 1, 1));
+  Session session = whole.session(respondent, protocols::SessionPlan(whole.protocol, 1, 1));
   run(session);
   const auto& expected = whole.log.finished;
   for (std::size_t stop = 0; stop <= expected.size(); ++stop) {
     SessionBench bench;
-    SessionPlan plan(bench.protocol, 1, 1);
-    for (std::size_t i = 0; i < stop; ++i) plan.answered(expected[i].correct);
+    protocols::SessionPlan plan(bench.protocol, 1, 1);
+    for (std::size_t i = 0; i < stop; ++i)
+      plan.answered({expected[i].correct, expected[i].correct});
     ScriptedRespondent rest(
         {script.begin() + static_cast<std::ptrdiff_t>(std::min(stop, script.size())),
          script.end()});
@@ -119,7 +120,7 @@ TEST(Session, AFaultCutsTheTrialOffWithZeroForce) {
   });
   servo::Servo servo(failing, bench.clock, 1000, servo::ForceLimits{});
   ScriptedRespondent respondent({-1});
-  Session session = bench.session(respondent, SessionPlan(bench.protocol, 1, 1), servo);
+  Session session = bench.session(respondent, protocols::SessionPlan(bench.protocol, 1, 1), servo);
   EXPECT_THROW(run(session), SessionFault);
   EXPECT_EQ(failing.force, Vec3(0));
   EXPECT_EQ(bench.log.began.size(), 1u);
@@ -148,7 +149,7 @@ TEST(Session, ACutOffTrialIsShownAgainAndBothAttemptsAreOnRecord) {
     ScriptedRespondent respondent({});
     Session session({protocol,
                      bench.library,
-                     SessionPlan(protocol, participant.number, 1),
+                     protocols::SessionPlan(protocol, participant.number, 1),
                      servo,
                      bench.clock,
                      {0, 0},
@@ -161,8 +162,9 @@ TEST(Session, ACutOffTrialIsShownAgainAndBothAttemptsAreOnRecord) {
     const data::SessionProgress before = store.progress(participant, 1);
     EXPECT_EQ(before.completed.size(), 2u);
     EXPECT_EQ(before.cut_off, 1);
-    SessionPlan plan(protocol, participant.number, 1);
-    for (const data::TrialRecord& record : before.completed) plan.answered(record.correct);
+    protocols::SessionPlan plan(protocol, participant.number, 1);
+    for (const data::TrialRecord& record : before.completed)
+      plan.answered({record.correct, record.correct});
     RunRecord again(store, info_of(protocol), participant, info);
     Session resumed({protocol, bench.library, plan, bench.servo, bench.clock, {0, 0}, again},
                     respondent);

@@ -150,7 +150,7 @@ TEST_F(TaskSession, GivesTheSameDatabaseWhereverItIsInterrupted) {
   const data::ClockStamp utc = simulated_run(protocol, settings, 1, 1).clock;
   for (std::size_t stop = 0; stop < count; ++stop) {
     KeptTrials before;
-    run_simulated_session(study, {1, SessionPlan(protocol, 1, 1), 0, utc}, before,
+    run_simulated_session(study, {1, protocols::SessionPlan(protocol, 1, 1), 0, utc}, before,
                           [&] { return before.trials.size() >= stop; });
     ASSERT_EQ(before.trials.size(), stop);
     const std::string database = path("stop-" + std::to_string(stop) + ".db");

@@ -1,13 +1,14 @@
 // The next trial follows from protocol, participant and answers alone, and every trial agrees with
 // its block.
 
-#include "protocols/tasks/task_plan.h"
+#include "protocols/session_plan.h"
 
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <map>
 
+#include "protocols/tasks/block_order.h"
 #include "tests/protocols/tasks/task_study.h"
 
 namespace palpate::protocols {
@@ -25,12 +26,12 @@ bool same(const Trial& a, const Trial& b) {
          a.orientation == b.orientation && a.catch_trial == b.catch_trial;
 }
 
-TEST(TaskPlan, ContinuesTheSameFromAnyTrial) {
+TEST(SessionPlan, ContinuesTheSameFromAnyTrial) {
   const Protocol protocol = parsed(task_study());
-  const std::vector<Trial> whole = worked_off(TaskPlan(protocol, 3, 1));
+  const std::vector<Trial> whole = worked_off(SessionPlan(protocol, 3, 1));
   ASSERT_GT(whole.size(), 60U);
   for (std::size_t stop = 0; stop <= whole.size(); ++stop) {
-    TaskPlan resumed(protocol, 3, 1);
+    SessionPlan resumed(protocol, 3, 1);
     for (std::size_t i = 0; i < stop; ++i) resumed.answered(answer_to(whole[i]));
     EXPECT_EQ(resumed.done(), stop);
     const std::vector<Trial> rest = worked_off(resumed);
@@ -39,12 +40,12 @@ TEST(TaskPlan, ContinuesTheSameFromAnyTrial) {
   }
 }
 
-TEST(TaskPlan, ShowsEveryConstantLevelEquallyOftenInEitherInterval) {
+TEST(SessionPlan, ShowsEveryConstantLevelEquallyOftenInEitherInterval) {
   for (const int participant : {1, 2, 17}) {
     std::map<double, int> shown, first;
     double before = 0;
     int run = 0;
-    for (const Trial& trial : worked_off(TaskPlan(parsed(task_study()), participant, 1))) {
+    for (const Trial& trial : worked_off(SessionPlan(parsed(task_study()), participant, 1))) {
       if (trial.task_block != 0) continue;
       ASSERT_EQ(trial.intervals.size(), 2U);
       ++shown[*trial.level];
@@ -64,9 +65,9 @@ TEST(TaskPlan, ShowsEveryConstantLevelEquallyOftenInEitherInterval) {
   }
 }
 
-TEST(TaskPlan, EndsAnAdaptiveBlockThatNobodyAnswers) {
+TEST(SessionPlan, EndsAnAdaptiveBlockThatNobodyAnswers) {
   const Protocol protocol = parsed(task_study());
-  TaskPlan plan(protocol, 1, 1);
+  SessionPlan plan(protocol, 1, 1);
   std::map<int, std::size_t> shown;
   while (!plan.finished()) {
     ++shown[plan.next().task_block];
@@ -78,13 +79,13 @@ TEST(TaskPlan, EndsAnAdaptiveBlockThatNobodyAnswers) {
   EXPECT_EQ(shown[0], 24U);  // constant stimuli are shown once
 }
 
-TEST(TaskPlan, FollowsEachStaircaseByItsOwnAnswers) {
+TEST(SessionPlan, FollowsEachStaircaseByItsOwnAnswers) {
   const Protocol protocol = parsed(task_study());
   std::map<int, Procedure> tracks;
   for (int i = 0; i < 2; ++i)
     tracks.emplace(i + 1, Procedure(protocol.blocks[1].procedures[static_cast<std::size_t>(i)], 0));
   std::set<int> positions;
-  for (const Trial& trial : worked_off(TaskPlan(protocol, 2, 1))) {
+  for (const Trial& trial : worked_off(SessionPlan(protocol, 2, 1))) {
     if (trial.task_block != 1) continue;
     ASSERT_EQ(trial.intervals.size(), 3U);
     EXPECT_EQ(std::count_if(trial.intervals.begin(), trial.intervals.end(),
@@ -102,11 +103,11 @@ TEST(TaskPlan, FollowsEachStaircaseByItsOwnAnswers) {
   for (const auto& [number, track] : tracks) EXPECT_FALSE(track.next_level().has_value());
 }
 
-TEST(TaskPlan, DrawsTheSameWhateverTheAnswersAre) {
+TEST(SessionPlan, DrawsTheSameWhateverTheAnswersAre) {
   const Protocol protocol = parsed(task_study());
   for (const bool right : {false, true}) {
     std::size_t shown = 0;
-    for (TaskPlan plan(protocol, 2, 1); !plan.finished();
+    for (SessionPlan plan(protocol, 2, 1); !plan.finished();
          plan.answered({right, right, true, std::nullopt})) {
       const Trial& trial = plan.next();
       if (trial.task_block != 1) continue;
@@ -123,11 +124,11 @@ TEST(TaskPlan, DrawsTheSameWhateverTheAnswersAre) {
   }
 }
 
-TEST(TaskPlan, HasTheShareOfCatchTrials) {
+TEST(SessionPlan, HasTheShareOfCatchTrials) {
   int catches = 0, all = 0;
   std::map<decltype(Trial::renderer), int> of_renderer, catches_of_renderer;
   std::map<int, std::set<decltype(Trial::renderer)>> of_track;
-  for (const Trial& trial : worked_off(TaskPlan(parsed(task_study()), 1, 1))) {
+  for (const Trial& trial : worked_off(SessionPlan(parsed(task_study()), 1, 1))) {
     if (trial.task_block != 2) continue;
     ++all;
     ++of_renderer[trial.renderer];
@@ -150,13 +151,13 @@ TEST(TaskPlan, HasTheShareOfCatchTrials) {
   for (const auto& [track, renderers] : of_track) EXPECT_EQ(renderers.size(), 1U) << track;
 }
 
-TEST(TaskPlan, SpreadsCatchTrialsOverAnAdaptiveBlock) {
+TEST(SessionPlan, SpreadsCatchTrialsOverAnAdaptiveBlock) {
   json document = task_study();
   document["blocks"] = json::array({document["blocks"][2]});
   document["blocks"][0]["procedure"] = json::parse(
       R"({"kind": "staircase", "start": 0.006, "min": 0.001, "max": 0.01, "steps": [0.001],
           "easier": "lower", "stop": {"trials": 100}})");
-  const std::vector<Trial> trials = worked_off(TaskPlan(parsed(document), 1, 1));
+  const std::vector<Trial> trials = worked_off(SessionPlan(parsed(document), 1, 1));
   for (std::size_t i = 0; i + 20 <= trials.size(); i += 20) {
     EXPECT_EQ(std::count_if(trials.begin() + static_cast<std::ptrdiff_t>(i),
                             trials.begin() + static_cast<std::ptrdiff_t>(i) + 20,
@@ -165,7 +166,7 @@ TEST(TaskPlan, SpreadsCatchTrialsOverAnAdaptiveBlock) {
   }
 }
 
-TEST(TaskPlan, BalancesBlocksAndKeepsPracticeBeforeItsOwn) {
+TEST(SessionPlan, BalancesBlocksAndKeepsPracticeBeforeItsOwn) {
   json document = task_study();
   document["block_order"] = "counterbalanced";
   json practice = document["blocks"][1];
@@ -183,7 +184,7 @@ TEST(TaskPlan, BalancesBlocksAndKeepsPracticeBeforeItsOwn) {
   }
   for (const int block : {0, 1, 3}) EXPECT_EQ(first[block], 2);
   int number = 0;
-  for (const Trial& trial : worked_off(TaskPlan(protocol, 2, 1))) {
+  for (const Trial& trial : worked_off(SessionPlan(protocol, 2, 1))) {
     EXPECT_GE(trial.block, number);
     number = trial.block;
     EXPECT_EQ(trial.practice, trial.task_block == 1);
@@ -191,18 +192,18 @@ TEST(TaskPlan, BalancesBlocksAndKeepsPracticeBeforeItsOwn) {
   EXPECT_EQ(number, 4);
 }
 
-TEST(TaskPlan, NumbersBlocksThroughAllSessions) {
+TEST(SessionPlan, NumbersBlocksThroughAllSessions) {
   json document = task_study();
   document["blocks"][2]["session"] = 2;
   const Protocol protocol = parsed(document);
   EXPECT_EQ(protocol.sessions.count, 2);
-  const std::vector<Trial> second = worked_off(TaskPlan(protocol, 1, 2));
+  const std::vector<Trial> second = worked_off(SessionPlan(protocol, 1, 2));
   ASSERT_EQ(second.size(), 24U);
   EXPECT_EQ(second.front().block, 3);
   EXPECT_EQ(second.front().trial, 1);
 }
 
-TEST(TaskPlan, StartsAdjustmentsInTurn) {
+TEST(SessionPlan, StartsAdjustmentsInTurn) {
   json document = task_study();
   document["blocks"] = json::parse(
       R"([{"name": "equal", "task": "adjust", "stimuli": ["soft"], "standard": "soft",
@@ -210,8 +211,8 @@ TEST(TaskPlan, StartsAdjustmentsInTurn) {
            "max": 600, "turn": 10, "starts": [150, 550], "repetitions": 4}])");
   const Protocol protocol = parsed(document);
   std::vector<double> one, two;
-  for (const Trial& trial : worked_off(TaskPlan(protocol, 1, 1))) one.push_back(*trial.level);
-  for (const Trial& trial : worked_off(TaskPlan(protocol, 2, 1))) two.push_back(*trial.level);
+  for (const Trial& trial : worked_off(SessionPlan(protocol, 1, 1))) one.push_back(*trial.level);
+  for (const Trial& trial : worked_off(SessionPlan(protocol, 2, 1))) two.push_back(*trial.level);
   EXPECT_EQ(one, (std::vector<double>{150, 550, 150, 550}));
   EXPECT_EQ(two, (std::vector<double>{550, 150, 550, 150}));
 }

@@ -1,4 +1,4 @@
-#include "analysis/input/task_trials.h"
+#include "analysis/input/study_table.h"
 
 #include <algorithm>
 #include <charconv>
@@ -128,7 +128,7 @@ class TaskRow {
 };
 
 /// Derives success for data of other programs without such a column. \return false: not possible
-bool success_of(TaskRow& row, TaskTrial& trial) {
+bool success_of(TaskRow& row, StudyTrial& trial) {
   const bool known = row.has("correct");
   if (trial.task == "identify") {
     trial.success = trial.response == trial.shape;
@@ -147,7 +147,7 @@ bool success_of(TaskRow& row, TaskTrial& trial) {
 }
 
 /// Ratings of other programs have their number as the response.
-void take_rated_number(TaskTrial& trial) {
+void take_rated_number(StudyTrial& trial) {
   if (trial.task != "rate" || trial.number) return;
   const std::string& text = trial.response;
   double number = 0;
@@ -163,8 +163,8 @@ int intervals_of(const TaskRow& row) {
   return static_cast<int>(std::count(onsets.begin(), onsets.end(), ';')) + 1;
 }
 
-TaskTrial read_trial(TaskRow& row) {
-  TaskTrial trial;
+StudyTrial read_trial(TaskRow& row) {
+  StudyTrial trial;
   trial.participant = row.text("participant_id");
   trial.task = row.value("task");
   if (trial.task.empty()) trial.task = "identify";  // of a study of version 1
@@ -202,20 +202,20 @@ TaskTrial read_trial(TaskRow& row) {
 }
 
 /// Puts the trials of each track in their order, in the places that they have.
-void order_trials(std::vector<TaskTrial>& trials) {
+void order_trials(std::vector<StudyTrial>& trials) {
   using Track =
       std::tuple<std::string, std::string, std::string, std::string, std::string, std::string>;
   std::map<Track, std::vector<std::size_t>> places;
   for (std::size_t i = 0; i < trials.size(); ++i) {
-    const TaskTrial& one = trials[i];
+    const StudyTrial& one = trials[i];
     places[{one.participant, one.task, one.block_name, one.renderer, one.shape, one.track}]
         .push_back(i);
   }
-  const auto number = [](const TaskTrial& one) {
+  const auto number = [](const StudyTrial& one) {
     return std::tuple(one.session, one.block, one.trial);
   };
   for (const auto& [track, own] : places) {
-    std::vector<TaskTrial> ordered;
+    std::vector<StudyTrial> ordered;
     ordered.reserve(own.size());
     for (const std::size_t i : own) ordered.push_back(std::move(trials[i]));
     std::ranges::stable_sort(ordered, {}, number);
@@ -224,10 +224,10 @@ void order_trials(std::vector<TaskTrial>& trials) {
 }
 
 /// "NA" is no answer unless a stimulus has that name.
-void drop_missing_answers(std::vector<TaskTrial>& trials) {
+void drop_missing_answers(std::vector<StudyTrial>& trials) {
   std::set<std::string> shapes;
-  for (const TaskTrial& trial : trials) shapes.insert(trial.shape);
-  for (TaskTrial& trial : trials) {
+  for (const StudyTrial& trial : trials) shapes.insert(trial.shape);
+  for (StudyTrial& trial : trials) {
     if (trial.task != "identify" || !is_missing(trial.response) || shapes.contains(trial.response))
       continue;
     trial.response.clear();
@@ -237,16 +237,16 @@ void drop_missing_answers(std::vector<TaskTrial>& trials) {
 
 /// The procedures of a protocol, and its title if the trials are of it.
 void put_protocol(const std::string& sha256, const std::string& text, const std::string& path,
-                  TaskTable& table) {
+                  StudyTable& table) {
   table.procedures[sha256] = protocols::procedures_of_blocks(text, path);
   const bool used = std::ranges::any_of(table.protocols,
                                         [&](const auto& known) { return known.second == sha256; });
   if (used && table.title.empty()) table.title = data::read_stored_protocol(text).title;
 }
 
-void warn_of_alike_names(TaskTable& table) {
+void warn_of_alike_names(StudyTable& table) {
   Interner participants, renderers, shapes;
-  for (const TaskTrial& trial : table.trials) {
+  for (const StudyTrial& trial : table.trials) {
     participants.number(trial.participant);
     renderers.number(trial.renderer);
     shapes.number(trial.shape);
@@ -256,9 +256,15 @@ void warn_of_alike_names(TaskTable& table) {
   warn_of_alike("Stimuli", shapes.names(), table.warnings);
 }
 
-}  // namespace
+bool is_wanted(const std::vector<std::string>& wanted, std::string_view name,
+               std::string_view sha256) {
+  return wanted.empty() || std::ranges::any_of(wanted, [&](const std::string& one) {
+           return is_protocol(one, name, sha256);
+         });
+}
 
-bool has_task_trials(const std::string& path, const std::string& protocol) {
+/// Whether the rows of a file are of tasks; it may have others, too.
+bool is_of_tasks(const std::string& path, const std::vector<std::string>& wanted) try {
   CsvReader reader(path);
   const Columns columns = read_header(reader);
   if (!columns.contains("task")) return false;
@@ -266,16 +272,18 @@ bool has_task_trials(const std::string& path, const std::string& protocol) {
   bool has_others = false;
   while (reader.next()) {
     const TaskRow row(path, columns, reader, faults);
-    if (!is_protocol(protocol, row.value("protocol_name"), row.value("protocol_sha256"))) continue;
+    if (!is_wanted(wanted, row.value("protocol_name"), row.value("protocol_sha256"))) continue;
     if (!row.value("task").empty()) return true;
     has_others = true;
   }
   return !has_others;
+} catch (const std::runtime_error&) {
+  return false;  // read_trials_csv says what is wrong
 }
 
-TaskTable read_task_trials_csv(const std::string& path, const std::string& protocol,
-                               const std::vector<ProtocolText>& protocols) {
-  TaskTable table;
+StudyTable read_tasks_csv(const std::string& path, const std::vector<std::string>& wanted,
+                          const std::vector<ProtocolText>& protocols) {
+  StudyTable table;
   table.source = table.provenance.source = path;
   std::vector<protocols::Fault> faults;
   CsvReader reader(path);
@@ -314,7 +322,7 @@ TaskTable read_task_trials_csv(const std::string& path, const std::string& proto
                     std::string(row.value("protocol_sha256")));
     const auto stated = std::ranges::find(protocols, named.second, &ProtocolText::sha256);
     if (stated != protocols.end()) named.first = stated->name;
-    if (!is_protocol(protocol, named.first, named.second)) continue;
+    if (!is_wanted(wanted, named.first, named.second)) continue;
     const bool simulated = row.yes("simulated");
     table.simulated |= simulated;
     if (row.yes("practice")) {
@@ -322,7 +330,7 @@ TaskTable read_task_trials_csv(const std::string& path, const std::string& proto
       continue;
     }
     table.trials.push_back(read_trial(row));
-    TaskTrial& trial = table.trials.back();
+    StudyTrial& trial = table.trials.back();
     trial.simulated = simulated;
     if (!protocols.empty()) trial.participant_number = row.whole("participant_number");
     note_shown(trial.protocol_sha256, table.provenance.protocol_sha256);
@@ -342,7 +350,7 @@ TaskTable read_task_trials_csv(const std::string& path, const std::string& proto
   if (faults.empty() && table.trials.empty())
     faults.push_back({path, "line 1",
                       "expected at least one trial that is not practice" +
-                          (protocol.empty() ? "" : " of the protocol " + protocol)});
+                          (wanted.empty() ? "" : " of the protocol " + wanted.front())});
   if (!faults.empty()) throw protocols::InputError(std::move(faults));
   for (const ProtocolText& one : protocols) put_protocol(one.sha256, one.text, path, table);
   if (numbered) order_trials(table.trials);
@@ -352,26 +360,13 @@ TaskTable read_task_trials_csv(const std::string& path, const std::string& proto
   return table;
 }
 
-std::optional<TrialTable> identification_of(const TaskTable& table) {
+std::optional<TrialTable> times_of(const StudyTable& table) {
   TrialTableBuilder builder;
   std::size_t n = 0;
-  for (const TaskTrial& trial : table.trials) {
+  for (const StudyTrial& trial : table.trials) {
     if (trial.task != "identify" || trial.level) continue;
     if (!trial.response_time && !trial.timed_out) return std::nullopt;
-    RawTrial raw;
-    raw.participant = trial.participant;
-    raw.renderer = trial.renderer;
-    raw.shape = trial.shape;
-    raw.response = trial.response;
-    raw.session = trial.session;
-    raw.block = trial.block;
-    raw.trial = trial.trial;
-    raw.correct = trial.correct.value_or(false);
-    raw.timed_out = trial.timed_out;
-    raw.simulated = trial.simulated;
-    raw.response_time = trial.response_time.value_or(kNoTime);
-    raw.protocol = trial.protocol_sha256;
-    builder.add(raw);
+    builder.add(trial);
     ++n;
   }
   if (n == 0) return std::nullopt;
@@ -382,8 +377,75 @@ std::optional<TrialTable> identification_of(const TaskTable& table) {
   }
 }
 
-TaskTrial task_trial_of(const std::string& participant, const data::TrialRecord& record) {
-  TaskTrial trial;
+StudyTable read_tasks_store(data::Store& store, const std::string& protocol) {
+  const std::string& path = store.path();
+  StudyTable table;
+  table.source = table.provenance.source = path;
+  std::vector<std::string> names, observers;
+  const data::TorqueNotes torque_notes(store);
+  TorqueCounts torque;
+  store.for_each_trial([&](const data::StoredTrial& stored) {
+    if (!is_protocol(protocol, stored.protocol_name, stored.protocol_sha256)) return;
+    const std::pair known(stored.protocol_name, stored.protocol_sha256);
+    if (std::find(table.protocols.begin(), table.protocols.end(), known) == table.protocols.end())
+      table.protocols.push_back(known);
+    table.simulated |= stored.participant.simulated;
+    if (stored.record.practice) {
+      ++table.n_practice;
+    } else {
+      table.trials.push_back(study_trial_of(stored.participant.code, stored.record));
+      table.trials.back().protocol_sha256 = stored.protocol_sha256;
+      table.trials.back().participant_number = stored.participant.enrolled_number;
+      table.trials.back().simulated = stored.participant.simulated;
+      torque.add(stored.record.renderer, torque_notes.driven(stored));
+      note_once(stored.protocol_name, names);
+      note_once(stored.protocol_sha256, table.provenance.protocol_sha256);
+      note_once(stored.run.program_version, table.provenance.program_versions);
+      note_once(stored.run.observer_sha256, observers);
+    }
+  });
+  for (const data::ProtocolInfo& one : store.protocols()) {
+    if (is_protocol(protocol, one.name, one.sha256))
+      put_protocol(one.sha256, one.text, path, table);
+  }
+  table.people = data::participant_columns(store);
+  std::set<std::string> shown;
+  for (const StudyTrial& trial : table.trials) shown.insert(trial.participant);
+  for (data::ParticipantColumn& column : table.people)
+    std::erase_if(column.answers, [&](const auto& one) { return !shown.contains(one.first); });
+  table.provenance.protocol_name = listed(names);
+  table.provenance.observer_sha256 = listed(observers);
+  if (table.trials.empty())
+    throw protocols::InputError(
+        {{path, "trials",
+          "expected at least one completed trial that is not practice" +
+              (protocol.empty() ? "" : " of the protocol " + printable(protocol))}});
+  warn_of_alike_names(table);
+  torque.warn(table.warnings);
+  return table;
+}
+
+/// A study of shapes: its times, with the shapes in the order of its protocols.
+StudyTable of_shapes(TrialTable times, const std::string& source,
+                     const std::vector<ProtocolText>& protocols) {
+  StudyTable table;
+  std::vector<std::string> order;
+  for (const ProtocolText& one : protocols) {
+    for (const std::string& name : data::read_stored_protocol(one.text).stimuli)
+      note_once(name, order);
+  }
+  if (!order.empty()) order_shapes(times, order);
+  table.source = source;
+  table.simulated = times.simulated != Simulated::no;
+  table.provenance = times.provenance;
+  table.times = std::move(times);
+  return table;
+}
+
+}  // namespace
+
+StudyTrial study_trial_of(const std::string& participant, const data::TrialRecord& record) {
+  StudyTrial trial;
   trial.participant = participant;
   trial.renderer = record.renderer;
   trial.shape = record.shape;
@@ -408,52 +470,24 @@ TaskTrial task_trial_of(const std::string& participant, const data::TrialRecord&
   return trial;
 }
 
-TaskTable read_task_trials_store(const std::string& path, const std::string& protocol) {
-  data::Store store = data::Store::open(path, data::Store::Mode::read_only);
-  TaskTable table;
-  table.source = table.provenance.source = path;
-  std::vector<std::string> names, observers;
-  const data::TorqueNotes torque_notes(store);
-  TorqueCounts torque;
-  store.for_each_trial([&](const data::StoredTrial& stored) {
-    if (!is_protocol(protocol, stored.protocol_name, stored.protocol_sha256)) return;
-    const std::pair known(stored.protocol_name, stored.protocol_sha256);
-    if (std::find(table.protocols.begin(), table.protocols.end(), known) == table.protocols.end())
-      table.protocols.push_back(known);
-    table.simulated |= stored.participant.simulated;
-    if (stored.record.practice) {
-      ++table.n_practice;
-    } else {
-      table.trials.push_back(task_trial_of(stored.participant.code, stored.record));
-      table.trials.back().protocol_sha256 = stored.protocol_sha256;
-      table.trials.back().participant_number = stored.participant.enrolled_number;
-      table.trials.back().simulated = stored.participant.simulated;
-      torque.add(stored.record.renderer, torque_notes.driven(stored));
-      note_once(stored.protocol_name, names);
-      note_once(stored.protocol_sha256, table.provenance.protocol_sha256);
-      note_once(stored.run.program_version, table.provenance.program_versions);
-      note_once(stored.run.observer_sha256, observers);
-    }
+StudyTable read_study_csv(const std::string& path, const std::vector<std::string>& wanted,
+                          const std::vector<ProtocolText>& protocols) {
+  if (!is_of_tasks(path, wanted)) return of_shapes(read_trials_csv(path, wanted), path, protocols);
+  return read_tasks_csv(path, wanted, protocols);
+}
+
+StudyTable read_study_store(data::Store& store, const std::string& protocol) {
+  std::vector<data::ProtocolInfo> wanted = store.protocols();
+  std::erase_if(wanted, [&](const data::ProtocolInfo& one) {
+    return !is_protocol(protocol, one.name, one.sha256);
   });
-  for (const data::ProtocolInfo& one : store.protocols()) {
-    if (is_protocol(protocol, one.name, one.sha256))
-      put_protocol(one.sha256, one.text, path, table);
-  }
-  table.people = data::participant_columns(store);
-  std::set<std::string> shown;
-  for (const TaskTrial& trial : table.trials) shown.insert(trial.participant);
-  for (data::ParticipantColumn& column : table.people)
-    std::erase_if(column.answers, [&](const auto& one) { return !shown.contains(one.first); });
-  table.provenance.protocol_name = listed(names);
-  table.provenance.observer_sha256 = listed(observers);
-  if (table.trials.empty())
-    throw protocols::InputError(
-        {{path, "trials",
-          "expected at least one completed trial that is not practice" +
-              (protocol.empty() ? "" : " of the protocol " + printable(protocol))}});
-  warn_of_alike_names(table);
-  torque.warn(table.warnings);
-  return table;
+  if (!data::have_blocks(wanted))
+    return of_shapes(read_trials_store(store, protocol), store.path(), {});
+  return read_tasks_store(store, protocol);
+}
+
+void identify_times(StudyTable& table) {
+  if (!table.times) table.times = times_of(table);
 }
 
 }  // namespace palpate::analysis

@@ -1,0 +1,55 @@
+#pragma once
+// The trials of a study, from a database or a table, whatever it asked.
+
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "analysis/input/study_record.h"
+#include "analysis/input/trials.h"
+#include "data/store/participant_columns.h"
+#include "protocols/tasks/block_procedures.h"
+
+namespace palpate::analysis {
+
+/// The trials of a study. A study of shapes has them as times alone, whatever their number.
+struct StudyTable {
+  std::string source;              ///< path as the user gave it
+  std::vector<StudyTrial> trials;  ///< of blocks of tasks, in the order of the source
+  /// Identification without catch trials and levels; none: nothing is identified, or the source
+  /// lacks its times or numbers.
+  std::optional<TrialTable> times;
+  std::size_t n_practice = 0;  ///< left out
+  bool simulated = false;      ///< some participants are simulated
+  Provenance provenance;       ///< of all trials
+  std::string title;           ///< of the study, from its protocol; "": unknown
+  std::vector<std::string> warnings;
+  /// Answers that describe the participants of these trials; from databases only.
+  std::vector<data::ParticipantColumn> people;
+  /// Their protocols: name and SHA-256, each once.
+  std::vector<std::pair<std::string, std::string>> protocols;
+  /// The procedures, by SHA-256 of the protocol and name of the block; of a table only if its
+  /// protocols were given.
+  std::map<std::string, std::map<std::string, protocols::BlockProcedures>> procedures;
+};
+
+/// Reads an export of trials. Those of tasks need participant_id, task, renderer and shape; level,
+/// standard_level, success, number, confidence, ... are optional. Those of a study of shapes: see
+/// read_trials_csv.
+/// \param wanted  protocols to read (is_protocol); empty: all
+/// \param protocols  of the study, with their texts: their names, procedures and order of shapes
+/// belong to the trials, as in a database
+/// \throws protocols::InputError with every fault.
+StudyTable read_study_csv(const std::string& path, const std::vector<std::string>& wanted = {},
+                          const std::vector<ProtocolText>& protocols = {});
+
+/// Reads the completed trials of a database. \param protocol  the one that is wanted; "": all
+/// \throws protocols::InputError: there are none
+StudyTable read_study_store(data::Store& store, const std::string& protocol = "");
+
+/// Sets `times` from trials of tasks.
+void identify_times(StudyTable& table);
+
+}  // namespace palpate::analysis

@@ -1,0 +1,106 @@
+#pragma once
+// The trials of a session, one at a time: a pure function of protocol, session, participant number
+// and the answers so far, the same on every machine and compiler. Feeding it the recorded answers
+// restores the point of an interruption.
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "protocols/procedures/procedure.h"
+#include "protocols/protocol.h"
+#include "protocols/schedule.h"
+
+namespace palpate::protocols {
+
+/// The outcome of a trial, as far as the next ones depend on it.
+struct TrialOutcome {
+  bool correct = false;
+  bool success = false;  ///< the comparison chosen, "yes", "different"
+  bool answered = true;  ///< false: a time-out; an adaptive level is repeated
+  /// The level shown, if not the plan's; none: the plan's.
+  std::optional<double> level = std::nullopt;
+};
+
+/// The contents of a trial of an external block.
+struct TrialChoice {
+  int stimulus = 0;  ///< index into Protocol::stimuli, one of the block's
+  RendererKind renderer = RendererKind::point;
+  std::optional<double> level = std::nullopt;      ///< within the block's
+  std::optional<Quat> orientation = std::nullopt;  ///< none: the plan's
+  /// In order, where the block has several; stimulus, renderer and level above are those of the
+  /// judged one. Empty: one interval.
+  std::vector<Interval> intervals = {};
+};
+
+class SessionPlan {
+ public:
+  /// \param protocol  must outlive it
+  SessionPlan(const Protocol& protocol, int participant_number, int session);
+
+  bool finished() const { return !next_.has_value(); }
+  const Trial& next() const { return *next_; }  ///< \pre not finished()
+  /// The block of the next trial. \pre not finished()
+  const TaskBlock& block() const;
+  std::size_t done() const { return done_; }
+  std::size_t size() const;           ///< at most, as far as known now
+  std::size_t expected_size() const;  ///< likewise, if adaptive blocks take their usual course
+  /// The number of its last block.
+  int last_block() const { return first_block_ + static_cast<int>(sequences_.size()) - 1; }
+  /// True at the first trial of a block.
+  bool block_begins() const { return shown_ == 0; }
+  /// Trials before the next one in its block.
+  std::size_t done_in_block() const { return finished() ? 0 : shown_; }
+  /// Whether the trial before the next one was practice, of this session.
+  bool after_practice() const { return after_practice_; }
+  /// Shows the next trial at another level, which the procedure records with the answer.
+  /// \pre it belongs to an adaptive block and is not a catch trial
+  void propose(double level);
+  /// Sets the next trial as another program chose it.
+  /// \pre it belongs to an external block
+  void choose(const TrialChoice& choice);
+  /// The next trial has been answered.
+  void answered(const TrialOutcome& outcome);
+  /// The tracks of an adaptive block in progress.
+  const std::optional<InterleavedTracks>& tracks() const { return tracks_; }
+
+ private:
+  /// Trials without a break.
+  struct Sequence {
+    int block = 0;                   ///< index into Protocol::blocks
+    std::vector<Trial> trials = {};  ///< of the study of shapes; empty: as the block says
+  };
+
+  static std::vector<Sequence> sequences_of(const Protocol& protocol, int participant_number,
+                                            int session);
+  const Sequence& sequence() const { return sequences_[at_]; }
+  std::uint64_t block_index() const { return static_cast<std::uint64_t>(sequence().block); }
+  void begin_sequence();
+  void begin_shapes();
+  void add_round();
+  bool sequence_continues();
+  bool criterion_met() const;
+  void find_next();
+  Trial adaptive_trial() const;
+  long long most_in_sequence() const;
+  /// Of the sequences after this one. \param trials_of  a block
+  long long trials_after(long long (*trials_of)(const TaskBlock&)) const;
+
+  const Protocol* protocol_;
+  int participant_number_, session_;
+  std::vector<Sequence> sequences_;
+  int first_block_ = 1;               ///< number of the first sequence
+  std::size_t at_ = 0;                ///< into sequences_
+  std::size_t done_ = 0, shown_ = 0;  ///< in the session, in the sequence
+  std::size_t unanswered_ = 0;        ///< in an adaptive block
+  std::vector<Trial> fixed_;          ///< of the sequence as far as known; empty: adaptive
+  std::uint64_t rounds_ = 0;          ///< in fixed_; more than one if practice continues
+  std::optional<PracticeCriterion> criterion_;  ///< of the sequence
+  std::vector<bool> right_;                     ///< answers to the sequence
+  bool after_practice_ = false;
+  std::optional<InterleavedTracks> tracks_;
+  std::optional<Trial> next_;
+};
+
+}  // namespace palpate::protocols

@@ -1,0 +1,136 @@
+#include "protocols/tasks/block_order.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+#include <variant>
+
+#include "data/base/random.h"
+#include "protocols/order.h"
+#include "protocols/procedures/procedure.h"
+#include "protocols/schedule.h"
+#include "protocols/tasks/block_tracks.h"
+#include "protocols/tasks/block_trials.h"
+
+namespace palpate::protocols {
+namespace {
+
+constexpr std::size_t kCatchWindow = 20;    // trials
+constexpr long long kLeastUnanswered = 10;  // trials
+
+/// Whether trial `shown` (from 0) of an adaptive block is a catch trial.
+bool is_catch_trial(const Protocol& protocol, int participant, std::uint64_t block,
+                    std::size_t shown) {
+  const double share = protocol.blocks[static_cast<std::size_t>(block)].catch_trials;
+  if (!(share > 0)) return false;
+  const auto window = std::max(kCatchWindow, static_cast<std::size_t>(std::lround(1 / share)));
+  const auto count = std::max(
+      std::size_t{1}, static_cast<std::size_t>(std::lround(share * static_cast<double>(window))));
+  std::vector<int> marks(window, 0);
+  std::fill(marks.begin(), marks.begin() + static_cast<std::ptrdiff_t>(count), 1);
+  Random random = task_stream(protocol.seed, participant, block, kTaskCatch, shown / window);
+  random.shuffle(marks);
+  return marks[shown % window] == 1;
+}
+
+}  // namespace
+
+std::vector<int> blocks_in_order(const Protocol& protocol, int participant_number, int session) {
+  std::vector<std::vector<int>> units(1);  // each a block with the practice before it
+  for (int i = 0; i < static_cast<int>(protocol.blocks.size()); ++i) {
+    const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(i)];
+    if (block.session != session) continue;
+    units.back().push_back(i);
+    if (!block.practice) units.emplace_back();
+  }
+  const std::vector<int> last = std::move(units.back());  // practice after the last block
+  units.pop_back();
+  std::vector<int> order;
+  const int count = static_cast<int>(units.size());
+  const std::vector<int> row = protocol.blocks_counterbalanced && count > 1
+                                   ? latin_square_row(count, participant_number)
+                                   : std::vector<int>();
+  for (int i = 0; i < count; ++i) {
+    const int at = row.empty() ? i : row[static_cast<std::size_t>(i)];
+    const auto& unit = units[static_cast<std::size_t>(at)];
+    order.insert(order.end(), unit.begin(), unit.end());
+  }
+  order.insert(order.end(), last.begin(), last.end());
+  return order;
+}
+
+int block_orders(const Protocol& protocol) {
+  if (study_of_shapes(protocol)) return renderer_orders(protocol);
+  int orders = 1;
+  for (int session = 1; protocol.blocks_counterbalanced && session <= protocol.sessions.count;
+       ++session) {
+    const auto blocks =
+        static_cast<int>(std::ranges::count_if(protocol.blocks, [session](const TaskBlock& block) {
+          return block.session == session && !block.practice;
+        }));
+    if (blocks > 1) orders = std::max(orders, latin_square_rows(blocks));
+  }
+  return orders;
+}
+
+bool is_external(const Protocol& protocol) {
+  return std::ranges::any_of(
+      protocol.blocks, [](const TaskBlock& block) { return block.task == TaskKind::external; });
+}
+
+bool is_adaptive(const TaskBlock& block) {
+  return std::any_of(block.procedures.begin(), block.procedures.end(), [](const auto& spec) {
+    return !std::holds_alternative<ConstantStimuli>(spec);
+  });
+}
+
+long long most_trials_of(const TaskBlock& block) {
+  if (block.criterion) return block.criterion->most_trials;
+  if (block.task == TaskKind::external) return block.repetitions;
+  long long trials = 0;
+  for (const BlockTrack& track : tracks_of(block)) {
+    trials += track.procedure == nullptr ? block.repetitions
+                                         : static_cast<long long>(most_trials(*track.procedure));
+  }
+  return with_catch_trials(block, trials);
+}
+
+long long expected_trials_of(const TaskBlock& block) {
+  if (!is_adaptive(block)) return most_trials_of(block);
+  double trials = 0;
+  for (const BlockTrack& track : tracks_of(block))
+    trials += expected_trials(*track.procedure, Procedure(*track.procedure, 0));
+  return with_catch_trials(block, std::llround(trials));
+}
+
+std::size_t most_unanswered(const TaskBlock& block) {
+  return static_cast<std::size_t>(std::max(kLeastUnanswered, most_trials_of(block) / 4));
+}
+
+DrawnTrial drawn_trial(const Protocol& protocol, int participant_number, int block,
+                       std::size_t shown) {
+  const auto index = static_cast<std::uint64_t>(block);
+  const auto intervals = protocol.blocks[static_cast<std::size_t>(block)].intervals;
+  DrawnTrial out;
+  out.catch_trial = is_catch_trial(protocol, participant_number, index, shown);
+  Random random = task_stream(protocol.seed, participant_number, index, kTaskPosition, shown + 1);
+  out.position = static_cast<int>(random.below(static_cast<std::uint64_t>(intervals)));
+  out.orientation = orientation_in_block(protocol, participant_number, index, shown);
+  return out;
+}
+
+std::vector<int> track_order(const Protocol& protocol, int participant_number, int block,
+                             std::uint64_t round) {
+  const auto index = static_cast<std::uint64_t>(block);
+  std::vector<std::size_t> tracks(
+      tracks_of(protocol.blocks[static_cast<std::size_t>(block)]).size());
+  for (std::size_t i = 0; i < tracks.size(); ++i) tracks[i] = i;
+  std::vector<int> out;
+  for (const std::size_t track :
+       round_of_tracks(task_stream(protocol.seed, participant_number, index, kTaskTracks).next(),
+                       round, std::move(tracks)))
+    out.push_back(static_cast<int>(track) + 1);
+  return out;
+}
+
+}  // namespace palpate::protocols

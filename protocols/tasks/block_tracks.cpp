@@ -1,0 +1,63 @@
+#include "protocols/tasks/block_tracks.h"
+
+#include <cmath>
+#include <utility>
+
+namespace palpate::protocols {
+namespace {
+
+constexpr std::uint64_t kTaskStream = 5;  // schedule.cpp uses 1 to 4
+
+}  // namespace
+
+Random task_stream(std::uint64_t seed, int participant, std::uint64_t block, TaskUse use,
+                   std::uint64_t number) {
+  return Random(seed, {static_cast<std::uint64_t>(participant), kTaskStream, block, use, number});
+}
+
+std::vector<BlockTrack> tracks_of(const TaskBlock& block) {
+  std::vector<BlockTrack> tracks;
+  for (const int stimulus : block.stimuli) {
+    for (const RendererKind renderer : block.renderers) {
+      if (block.procedures.empty()) tracks.push_back({stimulus, renderer, nullptr});
+      for (const ProcedureSpec& procedure : block.procedures)
+        tracks.push_back({stimulus, renderer, &procedure});
+    }
+  }
+  return tracks;
+}
+
+long long with_catch_trials(const TaskBlock& block, long long trials) {
+  return trials +
+         std::llround(static_cast<double>(trials) * block.catch_trials / (1 - block.catch_trials));
+}
+
+void set_intervals(const TaskBlock& block, int position, Trial& trial) {
+  const Interval asked{trial.stimulus, trial.renderer, trial.level};
+  const Interval standard{block.standard.value_or(-1),
+                          block.standard_renderer.value_or(trial.renderer), std::nullopt, true};
+  switch (block.task) {
+    case TaskKind::identify:
+    case TaskKind::external:
+      trial.intervals = {asked};
+      break;
+    case TaskKind::compare:
+      trial.intervals.assign(static_cast<std::size_t>(block.intervals), standard);
+      if (!trial.catch_trial) trial.intervals[static_cast<std::size_t>(position)] = asked;
+      break;
+    case TaskKind::detect:
+      trial.intervals = {asked};
+      if (trial.catch_trial) trial.intervals[0] = {block.absent.value_or(-1), trial.renderer};
+      break;
+    case TaskKind::rate:
+      trial.intervals = {asked};
+      if (block.standard) trial.intervals.insert(trial.intervals.begin(), standard);
+      break;
+    case TaskKind::adjust:
+      trial.intervals = {asked, standard};  // alternating as often as the participant likes
+      break;
+  }
+  if (trial.catch_trial) trial.level.reset();
+}
+
+}  // namespace palpate::protocols

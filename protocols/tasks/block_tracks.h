@@ -1,0 +1,43 @@
+#pragma once
+// The tracks of a block, the intervals of its trials, and its random streams.
+
+#include <cstdint>
+#include <vector>
+
+#include "data/base/random.h"
+#include "protocols/protocol.h"
+#include "protocols/schedule.h"
+
+namespace palpate::protocols {
+
+/// The stimulus, renderer and procedure of a track.
+struct BlockTrack {
+  int stimulus = 0;
+  RendererKind renderer = RendererKind::point;
+  const ProcedureSpec* procedure = nullptr;  ///< of the block; nullptr: none
+};
+
+/// The tracks in order of their numbers, from 1: the procedure varies fastest.
+std::vector<BlockTrack> tracks_of(const TaskBlock& block);
+
+/// The number of trials with catch trials included.
+long long with_catch_trials(const TaskBlock& block, long long trials);
+
+/// Sets the intervals of a trial whose stimulus, renderer and level are set.
+/// \param position  of the comparison, from 0
+void set_intervals(const TaskBlock& block, int position, Trial& trial);
+
+/// The uses of a block's random streams. Part of the meaning of a seed: never renumber them.
+enum TaskUse : std::uint64_t {
+  kTaskOrder = 1,
+  kTaskPosition = 2,
+  kTaskOrientation = 3,
+  kTaskCatch = 4,
+  kTaskTracks = 5
+};
+/// \param seed  of the protocol
+/// \param block  its index
+Random task_stream(std::uint64_t seed, int participant, std::uint64_t block, TaskUse use,
+                   std::uint64_t number = 0);
+
+}  // namespace palpate::protocols

@@ -1,0 +1,248 @@
+#include "protocols/tasks/block_trials.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <variant>
+
+#include "data/base/random.h"
+#include "protocols/order.h"
+#include "protocols/tasks/block_order.h"
+#include "protocols/tasks/block_tracks.h"
+#include "protocols/tasks/levels.h"
+#include "stimuli/orientation.h"
+
+namespace palpate::protocols {
+namespace {
+
+/// Trials that are alike: a track at a level, or the catch trials.
+struct Category {
+  std::string name;
+  Trial trial;
+  int count = 0;
+};
+
+void add_levels(const TaskBlock& block, const BlockTrack& track, Category category,
+                std::vector<Category>& categories) {
+  if (track.procedure == nullptr) {
+    category.count = block.repetitions;
+    categories.push_back(category);
+    return;
+  }
+  const auto& constant = std::get<ConstantStimuli>(*track.procedure);
+  for (const double level : constant.levels) {
+    Category one = category;
+    one.name += " at " + level_text(level);
+    one.trial.level = level;
+    one.count = constant.repetitions;
+    categories.push_back(std::move(one));
+  }
+}
+
+std::vector<Category> categories_of(const Protocol& protocol, const TaskBlock& block) {
+  std::vector<Category> categories;
+  int number = 0;
+  long long trials = 0;
+  for (const BlockTrack& track : tracks_of(block)) {
+    Category category;
+    category.name = protocol.stimuli[static_cast<std::size_t>(track.stimulus)].name + " (" +
+                    to_string(track.renderer) + ")";
+    category.trial.stimulus = track.stimulus;
+    category.trial.renderer = track.renderer;
+    category.trial.track = ++number;
+    add_levels(block, track, category, categories);
+  }
+  for (const Category& category : categories) trials += category.count;
+  const auto catch_trials = static_cast<int>(with_catch_trials(block, trials) - trials);
+  if (catch_trials == 0) return categories;
+  // Catch trials are spread as evenly as possible over the tracks.
+  const int tracks = number;
+  for (int t = 0; t < tracks; ++t) {
+    const BlockTrack track = tracks_of(block)[static_cast<std::size_t>(t)];
+    Category category;
+    category.name = "catch trial";
+    category.trial.stimulus = track.stimulus;
+    category.trial.renderer = track.renderer;
+    category.trial.track = t + 1;
+    category.trial.catch_trial = true;
+    category.count = catch_trials / tracks + (t < catch_trials % tracks ? 1 : 0);
+    if (category.count > 0) categories.push_back(std::move(category));
+  }
+  return categories;
+}
+
+std::vector<int> ordered_categories(const std::vector<Category>& categories, const TaskBlock& block,
+                                    Random random) {
+  Protocol::Order order;
+  order.max_run = block.max_run;
+  order.min_distance = block.min_distance;
+  std::vector<int> counts;
+  std::vector<std::string> names;
+  counts.reserve(categories.size());
+  names.reserve(categories.size());
+  for (const Category& category : categories) {
+    counts.push_back(category.count);
+    names.push_back(category.name);
+  }
+  return order_block(counts, order, names, random);
+}
+
+/// The comparison's interval in each of `count` trials: each equally often, in random order.
+std::vector<int> positions(int count, int intervals, Random& random) {
+  std::vector<int> all, places;
+  for (int i = 0; i < intervals; ++i) places.push_back(i);
+  while (static_cast<int>(all.size()) < count) {
+    random.shuffle(places);
+    all.insert(all.end(), places.begin(), places.end());
+  }
+  all.resize(static_cast<std::size_t>(count));
+  random.shuffle(all);
+  return all;
+}
+
+/// In a random order under the limits of the block.
+std::vector<Trial> fixed_trials(const Protocol& protocol, int participant, int index,
+                                std::uint64_t round) {
+  const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
+  if (block.task == TaskKind::external) {  // placeholders until the program chooses
+    Trial trial;
+    trial.stimulus = block.stimuli.front();
+    trial.renderer = block.renderers.front();
+    trial.track = 1;
+    set_intervals(block, 0, trial);
+    return std::vector<Trial>(static_cast<std::size_t>(block.repetitions), trial);
+  }
+  const auto number = static_cast<std::uint64_t>(index);
+  std::vector<Category> categories = categories_of(protocol, block);
+  Random places = task_stream(protocol.seed, participant, number, kTaskPosition, round);
+  std::vector<std::vector<int>> left;
+  left.reserve(categories.size());
+  for (const Category& category : categories)
+    left.push_back(positions(category.count, block.intervals, places));
+  std::vector<std::size_t> shown(categories.size(), static_cast<std::size_t>(participant - 1));
+  std::vector<Trial> trials;
+  for (const int which : ordered_categories(
+           categories, block, task_stream(protocol.seed, participant, number, kTaskOrder, round))) {
+    const auto c = static_cast<std::size_t>(which);
+    Trial trial = categories[c].trial;
+    // Take the starts in turn; the next participant begins with the next start.
+    if (block.task == TaskKind::adjust)
+      trial.level = block.starts[shown[c]++ % block.starts.size()];
+    set_intervals(block, left[c].back(), trial);
+    left[c].pop_back();
+    trials.push_back(std::move(trial));
+  }
+  return trials;
+}
+
+/// The study of shapes that determines an order.
+/// \param block  null: all stimuli
+Protocol shapes_view(const Protocol& protocol, const TaskBlock* block) {
+  Protocol view;
+  view.seed = protocol.seed;
+  view.renderers = protocol.renderers;
+  view.orientation = protocol.orientation;
+  view.orientations = protocol.orientations;
+  const auto add = [&](const StimulusSpec& stimulus) {
+    view.stimuli.push_back({stimulus.name, {}});
+  };
+  if (block == nullptr) {
+    for (const StimulusSpec& stimulus : protocol.stimuli) add(stimulus);
+    return view;
+  }
+  for (const int stimulus : block->stimuli)
+    add(protocol.stimuli[static_cast<std::size_t>(stimulus)]);
+  view.renderers = block->renderers;
+  view.renderer_order =
+      block->renderers.size() > 1 ? RendererOrder::interleaved : RendererOrder::fixed;
+  view.order.max_run = block->max_run;
+  view.order.min_distance = block->min_distance;
+  view.practice.repetitions = block->repetitions;
+  return view;
+}
+
+std::vector<Trial> shapes_trials(const Protocol& protocol, int participant, int index, int round) {
+  const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
+  const Protocol view = shapes_view(protocol, &block);
+  const auto before = std::count_if(
+      protocol.blocks.begin(), protocol.blocks.begin() + index, [&](const TaskBlock& other) {
+        return has_order_of_shapes(other) && other.practice == block.practice &&
+               other.renderers == block.renderers;
+      });
+  const int number = static_cast<int>(before);
+  std::vector<Trial> trials =
+      block.practice
+          ? practice_round(view, participant, block.renderers.front(), number + 1 + round)
+          : block_of_trials(view, participant, block.renderers, number, block.repetitions);
+  const std::vector<BlockTrack> tracks = tracks_of(block);
+  for (Trial& trial : trials) {
+    trial.stimulus = block.stimuli[static_cast<std::size_t>(trial.stimulus)];
+    const auto is_its = [&](const BlockTrack& track) {
+      return track.stimulus == trial.stimulus && track.renderer == trial.renderer;
+    };
+    const auto track = std::find_if(tracks.begin(), tracks.end(), is_its);
+    trial.track = static_cast<int>(track - tracks.begin()) + 1;
+    set_intervals(block, 0, trial);
+  }
+  return trials;
+}
+
+/// Draws the orientations of a block's main trials, together with those of all blocks of the
+/// participant.
+void draw_shape_orientations(const Protocol& protocol, int participant, int index,
+                             std::vector<Trial>& trials) {
+  std::vector<std::vector<Trial>> others;
+  std::vector<Trial*> all;
+  for (int session = 1; session <= protocol.sessions.count; ++session) {
+    for (const int other : blocks_in_order(protocol, participant, session)) {
+      const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(other)];
+      if (block.practice || !has_order_of_shapes(block)) continue;
+      if (other != index) others.push_back(shapes_trials(protocol, participant, other, 0));
+      for (Trial& trial : other == index ? trials : others.back()) all.push_back(&trial);
+    }
+  }
+  draw_orientations(shapes_view(protocol, nullptr), participant, all);
+}
+
+}  // namespace
+
+bool has_order_of_shapes(const TaskBlock& block) {
+  if (block.order == BlockOrder::shapes) return true;
+  return block.task == TaskKind::identify && block.procedures.empty() &&
+         (block.renderers.size() == 1 || (!block.max_run && !block.min_distance));
+}
+
+std::vector<Trial> trials_of_block(const Protocol& protocol, int participant, int index,
+                                   std::uint64_t round) {
+  const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
+  if (!has_order_of_shapes(block)) return fixed_trials(protocol, participant, index, round);
+  std::vector<Trial> trials = shapes_trials(protocol, participant, index, static_cast<int>(round));
+  if (!block.practice) draw_shape_orientations(protocol, participant, index, trials);
+  return trials;
+}
+
+Quat orientation_in_block(const Protocol& protocol, int participant, std::uint64_t block,
+                          std::size_t shown) {
+  Random random = task_stream(protocol.seed, participant, block, kTaskOrientation, shown + 1);
+  switch (protocol.orientation) {
+    case OrientationKind::uniform:
+      return stimuli::uniform_rotation(random);
+    case OrientationKind::listed:
+      return protocol.orientations[random.below(protocol.orientations.size())];
+    case OrientationKind::fixed:
+      break;
+  }
+  return Quat(1, 0, 0, 0);
+}
+
+void check_order(const Protocol& protocol, int block) {
+  const TaskBlock& checked = protocol.blocks[static_cast<std::size_t>(block)];
+  if (has_order_of_shapes(checked)) {
+    shapes_trials(protocol, 1, block, 0);
+  } else if (!is_adaptive(checked)) {
+    fixed_trials(protocol, 1, block, 0);
+  }
+}
+
+}  // namespace palpate::protocols
