@@ -16,7 +16,7 @@ namespace {
 
 constexpr double kSmallRoom = 1e-6, kLargeRoom = 0.25;  // of the size
 constexpr double kStep = 0.02;                          // rad; larger turns are divided
-constexpr int kMostSteps = 64, kContactSteps = 8;       // steps of a tick; at a first contact
+constexpr int kMostSteps = 64;                          // of a tick
 
 using PatchKind = SurfacePatch::Kind;
 
@@ -221,10 +221,30 @@ void SurfaceTool::step(const ToolPose& target, const ToolPose& from) {
   double most = 1;
   do {
     most = 0.5 * turn(from, most);
-    stuck_ = false;
-    resume_planes();
-    translate();
-  } while (most > 0 && (stuck_ || in_crack_ || !planes_.leave_room()));
+    rest();
+  } while (most > 0 && !is_at_ease());
+  carry();
+}
+
+/// The same for a free tool: it goes straight until it meets the first patch.
+void SurfaceTool::meet(const ToolPose& target, const ToolPose& from) {
+  target_ = target;
+  stuck_ = false;
+  if (approach(from)) {
+    if (planes_.empty() && at_ == Vec3(0)) return;
+    rest();
+    if (is_at_ease()) return carry();
+  }
+  step(target, from);
+}
+
+void SurfaceTool::rest() {
+  stuck_ = false;
+  resume_planes();
+  translate();
+}
+
+void SurfaceTool::carry() {
   if (step_ && !stuck_) leave_steps();
   own_.carrying_count = 0;
   for (const SurfacePlane& plane : planes_.all()) {
@@ -234,36 +254,23 @@ void SurfaceTool::step(const ToolPose& target, const ToolPose& from) {
 
 void SurfaceTool::follow() {
   const std::size_t first_contact = all_.contacts.size();
-  ToolPose from = memory_.ideal;
-  if (!memory_.touching) {
+  if (memory_.touching) {
+    step(tick_.tool, memory_.ideal);
+  } else {
     if (far_away()) return;
-    from = tick_.state.has_last ? all_.last : tick_.tool;
+    const ToolPose from = tick_.state.has_last ? all_.last : tick_.tool;
     memory_.grasp = Vec3(0);
     own_.carrying_count = 0;
     const double angle = angle_between(carried_, from, tick_.tool);
-    int steps = std::clamp(static_cast<int>(std::ceil(angle / kStep)), 1, kMostSteps);
-    const auto go = [&](int done) {
-      ToolPose at = done == 0 ? from : between(from, tick_.tool, double(done) / steps);
-      for (int i = done + 1; i <= steps; ++i) {
-        step(i == steps ? tick_.tool : between(from, tick_.tool, double(i) / steps), at);
-        at = pose_;
-        at.tip = target_.tip + placed_.world_vector(at_);
-      }
-    };
-    go(0);
-    if (!planes_.empty() && steps < kContactSteps) {
-      // Finer steps find the patch that is met first. A tool that neither turns nor grows is free
-      // until then.
-      const double growth =
-          carried_ != nullptr ? 0 : std::abs(glm::length(tick_.tool.d) - glm::length(from.d));
-      const bool turns = tick_.sides && angle * tool_size() + growth > kExact * skin_;
-      const double free = turns || steps > 1 ? 0 : first_hit_ * kContactSteps - kExact;
-      steps = kContactSteps;
-      own_.carrying_count = 0;
-      go(std::clamp(static_cast<int>(free), 0, steps - 1));
+    const int steps = std::clamp(static_cast<int>(std::ceil(angle / kStep)), 1, kMostSteps);
+    ToolPose at = from;
+    for (int i = 1; i <= steps; ++i) {
+      const ToolPose target =
+          i == steps ? tick_.tool : between(from, tick_.tool, double(i) / steps);
+      planes_.empty() && !stuck_ ? meet(target, at) : step(target, at);
+      at = pose_;
+      at.tip = target_.tip + placed_.world_vector(at_);
     }
-  } else {
-    step(tick_.tool, from);
   }
   add_contacts();
   remember(first_contact);

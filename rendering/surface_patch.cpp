@@ -51,9 +51,17 @@ double to_side(const Vec3& p, const Vec3& a, const Vec3& b) {
   return glm::dot(apart, apart);
 }
 
+/// Whether a way goes through a patch, or past its border as near as that. \param time  where it
+/// meets the plane, as a fraction
+bool goes_through(const PatchPolygon& polygon, const Vec3& normal, const Vec3& from,
+                  const Vec3& way, double time, double tolerance, double border) {
+  return meets(polygon, from, way, std::min(border, tolerance)) ||
+         (border > tolerance && distance_off(polygon, normal, from + time * way) <= border);
+}
+
 /// Tests a segment end that moves from `from` to `to` against a triangle.
 void sweep_end(const Surface& surface, std::uint32_t index, std::uint8_t segment, bool tail,
-               const Vec3& from, const Vec3& to, double tolerance, PatchHit& first) {
+               const Vec3& from, const Vec3& to, double tolerance, double border, PatchHit& first) {
   const SurfaceTriangle& t = surface.triangles()[index];
   const Vec3 a = surface.vertices()[t.corners[0]] - from;
   const double start = -glm::dot(t.normal, a);
@@ -66,7 +74,7 @@ void sweep_end(const Surface& surface, std::uint32_t index, std::uint8_t segment
   PatchPolygon polygon;
   polygon.count = 3;
   for (std::size_t k = 0; k < 3; ++k) polygon.corners[k] = surface.vertices()[t.corners[k]];
-  if (!meets(polygon, from, way)) return;
+  if (!goes_through(polygon, t.normal, from, way, time, tolerance, border)) return;
   first = {{index << 2, segment, tail, PatchKind::face}, time};
 }
 
@@ -230,19 +238,19 @@ void cast_on_patch(const Surface& surface, const SurfacePatch& patch, const Patc
   if (!first.yields_to(time, patch.segment, patch.triangle())) return;
   const PatchPolygon polygon = polygon_of(surface, patch, tool);
   const Vec3 way = to - from;
-  if (meets(polygon, from, way, std::min(border, tolerance)) ||
-      (border > tolerance && distance_off(polygon, plane.normal, from + time * way) <= border))
+  if (goes_through(polygon, plane.normal, from, way, time, tolerance, border))
     first = {patch, time};
 }
 
 void sweep_triangle(const Surface& surface, std::uint32_t index, std::uint8_t segment,
                     std::uint8_t what, const PosedTool::Segment& from, const PosedTool::Segment& to,
-                    double tolerance, double slack, PatchHit& first) {
+                    double tolerance, double slack, double border, PatchHit& first) {
   if ((what & surface_pair::kTip) != 0)
-    sweep_end(surface, index, segment, false, from.start, to.start, tolerance, first);
+    sweep_end(surface, index, segment, false, from.start, to.start, tolerance, border, first);
   if (from.along == Vec3(0) && to.along == Vec3(0)) return;
   if ((what & surface_pair::kTail) != 0)
-    sweep_end(surface, index, segment, true, from.end(true), to.end(true), tolerance, first);
+    sweep_end(surface, index, segment, true, from.end(true), to.end(true), tolerance, border,
+              first);
   if ((what & surface_pair::kSides) == 0) return;
   const SurfaceTriangle& t = surface.triangles()[index];
   const double first_slope = glm::dot(t.normal, from.along),

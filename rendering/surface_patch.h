@@ -106,10 +106,10 @@ void cast_on_patch(const Surface& surface, const SurfacePatch& patch, const Patc
 
 /// The same for a segment whose ends move linearly, over all patches of a triangle and its own
 /// sides. \param what   patches to test; bits of surface_pair \param slack  m; edges and segment
-/// are extended by it
+/// are extended by it \param border  m; so far beyond its border a triangle is met as well
 void sweep_triangle(const Surface& surface, std::uint32_t triangle, std::uint8_t segment,
                     std::uint8_t what, const PosedTool::Segment& from, const PosedTool::Segment& to,
-                    double tolerance, double slack, PatchHit& first);
+                    double tolerance, double slack, double border, PatchHit& first);
 
 /// Calls visit(patch) for the patches of a triangle and its own sides.
 template <class Visit>

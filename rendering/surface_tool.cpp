@@ -526,16 +526,11 @@ void SurfaceTool::find_rest() {
     // A free tool stops before a patch that its goal is less than a skin away from. Exactly on it
     // and on another's border, rounding would decide whether a later cast meets either.
     Vec3 far_goal = goal;
-    double ahead = 1;
     if (planes_.empty()) {
       const double length = glm::length(goal - at_);
-      if (length > 0) {
-        ahead += skin_ / length;
-        far_goal += skin_ / length * (goal - at_);
-      }
+      if (length > 0) far_goal += skin_ / length * (goal - at_);
     }
     const PatchHit hit = cast(at_, far_goal);
-    if (round == 0) first_hit_ = ahead * hit.time;
     if (hit.hit()) {
       move_to_hit(far_goal, hit);
       continue;
@@ -561,9 +556,11 @@ void SurfaceTool::find_rest() {
 }
 
 /// Finds the first patch that the tool meets while its segment ends move linearly.
-PatchHit SurfaceTool::sweep(const PosedTool& from, const PosedTool& to, const Vec3& shift) const {
+/// \param border  m; so far beyond its border a patch is met as well
+PatchHit SurfaceTool::sweep(const PosedTool& from, const PosedTool& to, const Vec3& shift,
+                            double border) const {
   PatchHit first;
-  const double slack = kLonger * surface_.size();
+  const double slack = std::max(kLonger * surface_.size(), border);
   for (std::size_t j = 0; j < to.count; ++j) {
     const PosedTool::Segment& a = from.segments[j];
     const PosedTool::Segment b{to.segments[j].start + shift, to.segments[j].along};
@@ -571,7 +568,7 @@ PatchHit SurfaceTool::sweep(const PosedTool& from, const PosedTool& to, const Ve
         {a.start, a.end(true), b.start - a.start, b.end(true) - a.end(true), 2 * skin_, 0},
         [&](std::uint32_t triangle, std::uint8_t what) {
           sweep_triangle(surface_, triangle, static_cast<std::uint8_t>(j), what, a, b, tolerance_,
-                         slack, first);
+                         slack, border, first);
           return true;
         });
   }
@@ -614,6 +611,36 @@ double SurfaceTool::turn(const ToolPose& from, double most) {
   at_ = apart;
   planes_.clear();
   return 0;
+}
+
+/// Moves a free tool that turns to the virtual one, or above the first patches that it meets on its
+/// way there, as its ends move linearly; returns whether it found such a place. Leaves one that
+/// does not turn where it is.
+bool SurfaceTool::approach(const ToolPose& from) {
+  const PosedTool before = pose(from);
+  pose_ = target_;
+  turned_ = pose(target_);
+  at_ = placed_.local_vector(from.tip - target_.tip);
+  planes_.clear();
+  if (most_moved(before, turned_, at_) <= kExact * skin_) return true;
+  at_ = Vec3(0);
+  const double motion = most_moved(before, turned_, at_);
+  // It stops before a patch that the virtual tool is less than a skin away from, as in find_rest().
+  const double ahead = 1 + skin_ / motion;
+  PosedTool beyond = turned_;
+  for (std::size_t j = 0; j < beyond.count; ++j) {
+    const PosedTool::Segment& a = before.segments[j];
+    PosedTool::Segment& b = beyond.segments[j];
+    b.start = a.start + ahead * (b.start - a.start);
+    b.along = a.along + ahead * (b.along - a.along);
+  }
+  const PatchHit hit = sweep(before, beyond, Vec3(0), border());
+  if (!hit.hit()) return true;
+  own_.carrying[0] = patch_after_turn(surface_, hit.patch, turned_);
+  own_.carrying_count = 1;
+  const bool settled = settle(before, kFarPush * motion + 4 * skin_);
+  if (!settled) own_.carrying_count = 0;
+  return settled;
 }
 
 /// Puts planes back that were raised to let a turn pass.

@@ -52,13 +52,20 @@ class SurfaceTool {
   bool far_away();
   bool is_clear(const SegmentMotion& motion) const;
   void step(const ToolPose& target, const ToolPose& from);
+  void meet(const ToolPose& target, const ToolPose& from);
+  void rest();
+  void carry();
+  /// Whether the tool has found its place, and room to stay there.
+  bool is_at_ease() const { return !stuck_ && !in_crack_ && planes_.leave_room(); }
   SurfacePlane plane_at(const SurfacePatch& patch) const;
 
   // Turning.
   double turn(const ToolPose& from, double most);
+  bool approach(const ToolPose& from);
   bool settle(const PosedTool& from, double most_push);
   void lower_planes();
-  PatchHit sweep(const PosedTool& from, const PosedTool& to, const Vec3& shift) const;
+  PatchHit sweep(const PosedTool& from, const PosedTool& to, const Vec3& shift,
+                 double border = 0) const;
 
   // Translating.
   double room_on_triangles(double aside) const;
@@ -122,7 +129,6 @@ class SurfaceTool {
   };
   std::array<Parted, 8> parted_;  ///< the last patches that released the tool in this tick
   std::size_t parted_count_ = 0;
-  double first_hit_ = 0;  ///< PatchHit::time of the first cast of a step
   bool fresh_ = false;    ///< the list was made in this step
   bool in_list_ = false;  ///< the list is for the tool's orientation
   Vec3 moved_;            ///< m; then: from the listed tool to the turned one

@@ -741,6 +741,42 @@ TEST_P(SurfaceContact, AFineMeshIsNotEnteredByAStylusThatTurnsFast) {
   EXPECT_GT(contacts, 3000);
 }
 
+/// A hand that has come from outside in one tick is held where one is that came in small steps.
+TEST_P(SurfaceContact, AFirstContactIsThatOfSmallSteps) {
+  constexpr int kApproaches = 300, kSteps = 32;
+  constexpr std::uint64_t kSeed = 17;
+  Random random(kSeed);
+  const Scene scene({}, true, {}, nullptr, {surface_of({wavy_ball(4)})});
+  int alike = 0, touched = 0;
+  for (int i = 0; i < kApproaches; ++i) {
+    const Vec3 out = direction(random), spin = 0.01 * random.unit() * direction(random);
+    const Vec3 way = -4e-4 * glm::normalize(out + 0.5 * direction(random));
+    Vec3 tip = 0.045 * out, along = glm::normalize(out + 1.5 * random.unit() * direction(random));
+    RenderState state = scene.initial_state();
+    for (int t = 0; t < 200; ++t) {
+      const RenderState before = state;
+      const Vec3 last_tip = tip, last = along;
+      tip += way;
+      along = glm::normalize(along + glm::cross(spin, along));
+      const Rendering one = tick(scene, state, {tip, tip + 0.1 * along});
+      if (one.contacts == 0) continue;
+      ++touched;
+      RenderState small = before;
+      Rendering many;
+      for (int k = 1; k <= kSteps; ++k) {
+        const double part = static_cast<double>(k) / kSteps;
+        const Vec3 at = last_tip + part * way;
+        const Vec3 to = k == kSteps ? along : glm::normalize(glm::mix(last, along, part));
+        many = tick(scene, small, {k == kSteps ? tip : at, (k == kSteps ? tip : at) + 0.1 * to});
+      }
+      alike += glm::distance(one.ideal.tip, many.ideal.tip) <= 1e-9 ? 1 : 0;
+      break;
+    }
+  }
+  EXPECT_GT(touched, kApproaches / 2);
+  EXPECT_GE(alike, touched - touched / 100);
+}
+
 /// A segment is laid against a triangle or an edge, then its ends are moved away by as much as they
 /// may move: the triangle is still among those that it can touch.
 TEST(SurfaceTree, FindsAllThatAMovingSegmentCanTouch) {
