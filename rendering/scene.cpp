@@ -12,7 +12,7 @@ namespace {
 
 /// Makes the parts of one surface or layer contiguous. Keeps the order if they already are.
 void bring_together(std::vector<SceneObject>& objects) {
-  const auto key = [](const SceneObject& o) { return std::pair(o.object, o.layer); };
+  const auto key = [](const SceneObject& o) { return std::pair(o.own_solid(), o.layer); };
   std::vector<std::pair<int, int>> seen;
   bool apart = false;
   for (const SceneObject& object : objects) {
@@ -78,6 +78,7 @@ Scene::Scene(std::vector<SceneObject> objects, bool side_contact, Tool tool,
     features.friction |= part.material.has_friction();
     part.shallow_ridges = side_contact && part.trees->shallow_ridges();
     part.object = object.object;
+    part.solid = object.own_solid();
     part.layer = object.layer;
     part.break_force = object.break_force;
     parts_.push_back(std::move(part));
@@ -93,24 +94,24 @@ Scene::Scene(std::vector<SceneObject> objects, bool side_contact, Tool tool,
 }
 
 void Scene::group_parts() {
-  std::vector<int> objects;
+  std::vector<int> solids;
   for (std::uint32_t i = 0; i < parts_.size(); ++i) {
     const ScenePart& part = parts_[i];
-    if (i == 0 || part.object != parts_[i - 1].object || part.layer != parts_[i - 1].layer) {
-      const auto known = std::find(objects.begin(), objects.end(), part.object);
+    if (i == 0 || part.solid != parts_[i - 1].solid || part.layer != parts_[i - 1].layer) {
+      const auto known = std::find(solids.begin(), solids.end(), part.solid);
       PartGroup group;
       group.first_part = i;
       group.first_pair = i * static_cast<std::uint32_t>(segments());
-      group.object = part.object;
-      group.object_state = static_cast<std::uint32_t>(known - objects.begin());
+      group.solid = part.solid;
+      group.object_state = static_cast<std::uint32_t>(known - solids.begin());
       group.felt = part.layer != kNotFelt;
-      if (known == objects.end()) objects.push_back(part.object);
+      if (known == solids.end()) solids.push_back(part.solid);
       groups_.push_back(group);
     }
     ++groups_.back().part_count;
     parts_[i].group = static_cast<std::uint32_t>(groups_.size() - 1);
   }
-  object_states_ = objects.size();
+  object_states_ = solids.size();
   find_breaking_parts();
   std::vector<std::uint32_t> parts_of_object(object_states_);
   for (const PartGroup& group : groups_) parts_of_object[group.object_state] += group.part_count;
@@ -191,6 +192,8 @@ void Scene::add_surfaces(std::vector<SceneSurface> surfaces, TickFeatures& featu
         std::min(kOverSeam * surface.surface->seam(), kThickestSkin * surface.surface->size());
     surface.skin = std::max({kSkin * surface.surface->size(), 64 * surface.tolerance, over_seam});
     surface.object = placed.object;
+    surface.of_shell = std::move(placed.of_shell);
+    surface.of_shell.resize(surface.surface->materials().size(), placed.object);
     surface.group = static_cast<std::uint32_t>(groups_.size());
     surface.first_material = static_cast<std::uint32_t>(parts_.size() + materials_.size());
     for (const stimuli::Material& material : surface.surface->materials()) {
@@ -201,12 +204,12 @@ void Scene::add_surfaces(std::vector<SceneSurface> surfaces, TickFeatures& featu
     PartGroup group;
     group.first_part = static_cast<std::uint32_t>(parts_.size());
     group.first_pair = pairs;
-    group.object = placed.object;
+    group.solid = placed.object;
     group.by_law = true;
     group.skin = surface.skin;
     group.surface = static_cast<std::uint32_t>(surfaces_.size());
     const auto same = std::find_if(groups_.begin(), groups_.end(), [&](const PartGroup& other) {
-      return other.object == placed.object;
+      return other.solid == placed.object;
     });
     group.object_state =
         same != groups_.end() ? same->object_state : static_cast<std::uint32_t>(object_states_++);

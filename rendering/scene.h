@@ -25,6 +25,9 @@ namespace palpate::rendering {
 /// left the object.
 inline constexpr int kNotFelt = -1;
 
+/// The solid of an object that touches no other fixed one.
+inline constexpr int kAlone = -1;
+
 /// One convex part to be put into a scene.
 struct SceneObject {
   std::shared_ptr<const stimuli::ConvexMesh> mesh;
@@ -38,13 +41,19 @@ struct SceneObject {
   /// N; of a layer. Parts of equal break force whose total force exceeds it break, until the object
   /// has been left.
   double break_force = std::numeric_limits<double>::infinity();
+  /// Fixed objects that touch share an ideal tool: the first one's index. kAlone: it touches none.
+  int solid = kAlone;
+
+  int own_solid() const { return solid != kAlone ? solid : object; }
 };
 
-/// A closed surface to be put into a scene: all shells of an object.
+/// A closed surface to be put into a scene: all shells of an object, or of fixed objects that
+/// touch.
 struct SceneSurface {
   std::shared_ptr<const Surface> surface;
   Pose pose;
-  int object = 0;  ///< index of the object in the scene
+  int object = 0;               ///< index of the object in the scene; of several the first
+  std::vector<int> of_shell{};  ///< object of each shell; empty: all are of `object`
 };
 
 /// One convex part as the tick uses it.
@@ -58,6 +67,7 @@ struct ScenePart {
   double tolerance = 0;      ///< m; shorter is rounding at this size and distance from the origin
   stimuli::Material material;
   int object = 0;
+  int solid = 0;                ///< index of the object, or of the first of those that it touches
   bool shallow_ridges = false;  ///< equation (2) covers several faces (equivalent_point.h)
 
   int layer = 0;

@@ -318,7 +318,7 @@ void SurfaceTool::add_contact(const SurfacePlane& plane, const Vec3& shift) {
   c.part = placed_.first_material + triangle.shell;
   c.stiffness = tick_.scene.material_of(c.part).stiffness;
   c.force = c.stiffness * plane.multiplier;
-  c.object = placed_.object;
+  c.object = placed_.of_shell[triangle.shell];
   c.contact.type = ContactType::point_polygon;
   const Vec3 tip = segment.start + shift;
   if (tick_.sides && segment.along != Vec3(0)) {

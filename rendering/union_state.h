@@ -56,9 +56,10 @@ struct PlacedSurface {
   Vec3 position;  ///< of its origin
   Vec3 sphere_centre;
   double sphere_radius = 0;
-  double tolerance = 0;  ///< shorter is rounding
-  double skin = 0;       ///< the ideal tool keeps this distance from what it rests on
-  int object = 0;
+  double tolerance = 0;              ///< shorter is rounding
+  double skin = 0;                   ///< the ideal tool keeps this distance from what it rests on
+  int object = 0;                    ///< the first one
+  std::vector<int> of_shell;         ///< object of each shell
   std::uint32_t group = 0;           ///< index in Scene::groups()
   std::uint32_t first_material = 0;  ///< of the first shell, in Scene::material_of
 
@@ -247,7 +248,7 @@ struct PartGroup {
   std::uint32_t first_part = 0, part_count = 0;  ///< in the scene, contiguous
   std::uint32_t first_pair = 0;  ///< of part k and segment j: first_pair + k * segments + j
   std::uint32_t object_state = 0;
-  int object = 0;
+  int solid = 0;        ///< as of ScenePart
   bool by_law = false;  ///< else a single part without a tool, which the walk alone renders
   bool felt = true;     ///< false: no force; it only bounds the inside of the object
   double skin = 0;      ///< m; the ideal tool keeps this distance from what it rests on

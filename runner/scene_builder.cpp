@@ -6,12 +6,16 @@
 #include <cstring>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
+#include <glm/vector_relational.hpp>
 #include <limits>
+#include <optional>
+#include <span>
 #include <sstream>
 #include <stdexcept>
 
 #include "protocols/tasks/levels.h"
 #include "rendering/bodies/soft/soft_scene.h"
+#include "runner/touching_solids.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/inset.h"
 #include "stimuli/parts/convex_parts.h"
@@ -93,6 +97,15 @@ bool has_seams(const std::vector<rendering::SurfaceShell>& shells) {
   return surface.seam() > kFelt * surface.size();
 }
 
+/// Faults of an object, each with its place in the scene.
+std::vector<std::string> at_object(const std::vector<stimuli::ObjectSpec>& objects, std::size_t i,
+                                   std::vector<std::string> faults) {
+  std::string where = "/objects/" + std::to_string(i);
+  if (!objects[i].file.empty()) where += " (" + objects[i].file + ")";
+  for (std::string& fault : faults) fault.insert(0, where + (fault.starts_with('/') ? "" : ": "));
+  return faults;
+}
+
 bool has_layers(const stimuli::ObjectSpec& spec) {
   if (spec.shape != stimuli::ShapeKind::compound) return !spec.material.layers.empty();
   return std::any_of(spec.parts.begin(), spec.parts.end(), has_layers);
@@ -138,18 +151,20 @@ const rendering::Renderer& renderer_for(protocols::RendererKind kind) {
 
 /// One object on its way into a scene.
 struct SceneBuilder::Placing {
-  int object;
+  int solid;  ///< as of rendering::SceneObject
   bool side_contact;
   bool has_layers;  ///< anywhere: then its whole surface says where it ends
   bool by_surface;  ///< what is felt of its own surface is one closed surface
   std::vector<rendering::SceneObject>& out;
   std::vector<PlacedShape> all = {}, layered = {};  ///< its shapes; those that have layers
 
-  void add(int layer, const stimuli::Layer& of, const Prepared& prepared, const Pose& pose) {
+  void add(int object, int layer, const stimuli::Layer& of, const Prepared& prepared,
+           const Pose& pose) {
     rendering::SceneObject part{prepared.mesh, pose, {}, object, prepared.trees};
     part.material.stiffness = of.stiffness;
     part.material.damping = of.damping;
     part.layer = layer;
+    part.solid = solid;
     if (of.break_force) part.break_force = *of.break_force;
     out.push_back(std::move(part));
   }
@@ -226,13 +241,15 @@ std::vector<SceneBuilder::Prepared> SceneBuilder::layer_of(const std::vector<Pla
   return with_trees(stimuli::inset_union_within(whole, depth, own), placing.side_contact);
 }
 
-void SceneBuilder::place_layers(Placing& placing) {
+void SceneBuilder::place_layers(int object, Placing& placing) {
+  std::vector<PlacedShape> layered = placing.layered;
+  std::erase_if(layered, [&](const PlacedShape& shape) { return shape.object != object; });
   std::size_t most = 0;
-  for (const PlacedShape& shape : placing.layered)
+  for (const PlacedShape& shape : layered)
     most = std::max(most, shape.spec->material.layers.size());
   std::vector<std::string> faults;
   for (std::size_t i = 0; i < most; ++i) {
-    std::vector<PlacedShape> left = placing.layered;
+    std::vector<PlacedShape> left = layered;
     std::erase_if(left, [&](const auto& shape) { return shape.spec->material.layers.size() <= i; });
     double least = left.front().spec->material.layers[i].depth, deepest = 0;
     bool is_left = false;
@@ -246,7 +263,8 @@ void SceneBuilder::place_layers(Placing& placing) {
       least = std::min(least, layer.depth);
       Pose pose;
       const std::vector<Prepared> parts = layer_of(same, layer.depth, placing, pose);
-      for (const Prepared& part : parts) placing.add(static_cast<int>(i) + 1, layer, part, pose);
+      for (const Prepared& part : parts)
+        placing.add(object, static_cast<int>(i) + 1, layer, part, pose);
       is_left |= !parts.empty();
       if (!is_left)
         deepest =
@@ -261,10 +279,11 @@ void SceneBuilder::place_layers(Placing& placing) {
   if (!faults.empty()) throw stimuli::MeshError(std::move(faults));
 }
 
-void SceneBuilder::place(const stimuli::ObjectSpec& spec, const Pose& parent, Placing& placing) {
+void SceneBuilder::place(const stimuli::ObjectSpec& spec, const Pose& parent, int object,
+                         Placing& placing) {
   const Pose pose = stimuli::compose(parent, spec.pose);
   if (spec.shape == stimuli::ShapeKind::compound) {
-    for (const stimuli::ObjectSpec& part : spec.parts) place(part, pose, placing);
+    for (const stimuli::ObjectSpec& part : spec.parts) place(part, pose, object, placing);
     return;
   }
   stimuli::Material surface = spec.material;
@@ -272,7 +291,8 @@ void SceneBuilder::place(const stimuli::ObjectSpec& spec, const Pose& parent, Pl
   const bool in_parts = surface.stiffness > 0 ? !placing.by_surface : placing.has_layers;
   if (in_parts) {
     for (const Prepared& part : prepare(spec, 0, placing.side_contact)) {
-      rendering::SceneObject placed{part.mesh, pose, surface, placing.object, part.trees};
+      rendering::SceneObject placed{part.mesh, pose, surface, object, part.trees};
+      placed.solid = placing.solid;
       if (!(surface.stiffness > 0)) {
         placed.layer = rendering::kNotFelt;
         placed.material = {};
@@ -281,8 +301,8 @@ void SceneBuilder::place(const stimuli::ObjectSpec& spec, const Pose& parent, Pl
       placing.out.push_back(std::move(placed));
     }
   }
-  placing.all.push_back({&spec, pose});
-  if (!spec.material.layers.empty()) placing.layered.push_back({&spec, pose});
+  placing.all.push_back({&spec, pose, object});
+  if (!spec.material.layers.empty()) placing.layered.push_back({&spec, pose, object});
 }
 
 const LoadedMesh& SceneBuilder::mesh(const stimuli::ObjectSpec& spec) {
@@ -381,56 +401,159 @@ std::vector<rendering::MovingObject> SceneBuilder::moving_of(
   return moving;
 }
 
-SceneBuilder::Placed SceneBuilder::placed(const stimuli::ObjectSpec& spec, int object,
-                                          bool side_contact, const std::string& meets) {
-  Placed out;
-  // A solid of tetrahedra need not fall into convex parts, and nothing rigid is made of it.
-  if (spec.soft && spec.shape == stimuli::ShapeKind::mesh) return out;
-  Placing placing{object, side_contact, has_layers(spec), is_surface(spec), out.parts};
-  std::string reason = "layers need convex parts, and it cannot be cut into them: ";
-  try {
-    place(spec, Pose{}, placing);
-    place_layers(placing);
-    if (placing.by_surface && !meets.empty()) {
+/// Adds the corners of an object's shapes.
+void SceneBuilder::add_corners(const stimuli::ObjectSpec& spec, const Pose& parent,
+                               std::vector<Vec3>& corners) {
+  const Pose pose = stimuli::compose(parent, spec.pose);
+  const auto add = [&](std::span<const Vec3> vertices) {
+    for (const Vec3& v : vertices) corners.push_back(pose.orientation * v + pose.position);
+  };
+  for (const stimuli::ObjectSpec& part : spec.parts) add_corners(part, pose, corners);
+  if (spec.shape == stimuli::ShapeKind::compound) return;
+  if (spec.shape != stimuli::ShapeKind::mesh) return add(stimuli::polygons_of(spec).vertices);
+  const LoadedMesh& loaded = mesh(spec);
+  if (loaded.surface != nullptr) add(loaded.surface->vertices);
+  for (const auto& part : loaded.parts) add(part->vertices());
+}
+
+std::vector<std::vector<int>> SceneBuilder::solids_of(
+    const std::vector<stimuli::ObjectSpec>& objects) {
+  struct Standing {
+    Vec3 low{0}, high{0};
+    double room = 0;  ///< m; more than the errors of its corners
+    std::optional<StandingSurface> surface = {};
+  };
+  const auto is_fixed = [](const stimuli::ObjectSpec& object) {
+    return !object.body && !object.soft;
+  };
+  std::vector<std::optional<Standing>> standing_here(objects.size());
+  const bool several = std::ranges::count_if(objects, is_fixed) > 1;
+  for (std::size_t i = 0; i < objects.size() && several; ++i) {
+    if (!is_fixed(objects[i])) continue;
+    try {
+      std::vector<Vec3> corners;
+      add_corners(objects[i], Pose{}, corners);
+      if (corners.empty()) continue;
+      Standing& here = standing_here[i].emplace();
+      here.low = here.high = corners.front();
+      for (const Vec3& v : corners) {
+        here.low = glm::min(here.low, v);
+        here.high = glm::max(here.high, v);
+      }
+      here.room = 0.01 * glm::length(here.high - here.low) +
+                  2 * kPoseError * glm::length(here.high + here.low);
+    } catch (const std::exception&) {
+      standing_here[i].reset();  // its fault is found where it is placed
+    }
+  }
+  const auto meet = [&](int i, int k) {
+    auto &a = standing_here[static_cast<std::size_t>(i)],
+         &b = standing_here[static_cast<std::size_t>(k)];
+    if (!a || !b) return false;
+    const double room = a->room + b->room;
+    if (glm::any(glm::greaterThan(a->low, b->high + room)) ||
+        glm::any(glm::greaterThan(b->low, a->high + room)))
+      return false;
+    for (const int one : {i, k}) {
+      auto& here = standing_here[static_cast<std::size_t>(one)];
+      if (here->surface) continue;
+      const stimuli::ObjectSpec& spec = objects[static_cast<std::size_t>(one)];
+      std::vector<rendering::SurfaceShell> shells;
+      try {
+        add_shells(spec, spec.pose, false, shells);
+      } catch (const stimuli::MeshError&) {
+        here.reset();  // convex within its coordinates' error only
+        return false;
+      }
+      here->surface = standing(shells);
+    }
+    return touch(*a->surface, *b->surface);
+  };
+  return connected(static_cast<int>(objects.size()), meet);
+}
+
+/// Places convex parts: of surfaces without concave edges, of layers, and for collisions.
+void SceneBuilder::place_parts(const std::vector<stimuli::ObjectSpec>& objects,
+                               const std::vector<int>& solid, Placing& placing, Placed& out) {
+  for (const int object : solid) {
+    const auto index = static_cast<std::size_t>(object);
+    std::string reason = "layers need convex parts, and it cannot be cut into them: ";
+    try {
+      if (object == solid.front()) {
+        for (const int one : solid)
+          place(objects[static_cast<std::size_t>(one)], Pose{}, one, placing);
+      }
+      place_layers(object, placing);
+      const std::string meets = met_by(objects, index);
+      if (!placing.by_surface || meets.empty()) continue;
       reason = "it may meet " + meets +
                ", and collisions need convex parts; it cannot be cut into them: ";
       for (const PlacedShape& shape : placing.all) {
-        for (const Prepared& part : prepare(*shape.spec, 0, side_contact)) {
+        if (shape.object != object) continue;
+        for (const Prepared& part : prepare(*shape.spec, 0, placing.side_contact)) {
           out.solids.push_back({part.mesh, shape.pose, shape.spec->material, object, part.trees});
         }
       }
+    } catch (const stimuli::MeshError& error) {
+      // What asks for the cutting that failed.
+      std::vector<std::string> faults = error.faults();
+      for (std::string& fault : faults) {
+        if (placing.by_surface && !fault.starts_with('/')) fault.insert(0, reason);
+      }
+      throw stimuli::MeshError(at_object(objects, index, std::move(faults)));
     }
-  } catch (const stimuli::MeshError& error) {
-    if (!placing.by_surface) throw;
-    // What asks for the cutting that failed.
-    std::vector<std::string> faults = error.faults();
-    for (std::string& fault : faults) {
-      if (!fault.starts_with('/')) fault.insert(0, reason);
-    }
-    throw stimuli::MeshError(std::move(faults));
   }
   // The parts of a layer stand side by side.
   std::stable_sort(out.parts.begin(), out.parts.end(),
                    [](const auto& a, const auto& b) { return a.layer < b.layer; });
-  if (!placing.by_surface) return out;
-  std::shared_ptr<const rendering::Surface> surface;
+}
+
+SceneBuilder::Placed SceneBuilder::placed(const std::vector<stimuli::ObjectSpec>& objects,
+                                          const std::vector<int>& solid, bool side_contact) {
+  Placed out;
+  const bool alone = solid.size() == 1;
+  const auto index = static_cast<std::size_t>(solid.front());
+  const stimuli::ObjectSpec& first = objects[index];
+  // A solid of tetrahedra need not fall into convex parts, and nothing rigid is made of it.
+  if (first.soft && first.shape == stimuli::ShapeKind::mesh) return out;
+  stimuli::ObjectSpec joined;
+  joined.shape = stimuli::ShapeKind::compound;
+  for (const int object : solid) joined.parts.push_back(objects[static_cast<std::size_t>(object)]);
+  const stimuli::ObjectSpec& whole = alone ? first : joined;
+  bool by_surface = false;
+  try {
+    by_surface = is_surface(whole);
+  } catch (const stimuli::MeshError& error) {
+    throw stimuli::MeshError(at_object(objects, index, error.faults()));
+  }
+  Placing placing{alone ? rendering::kAlone : solid.front(), side_contact, has_layers(whole),
+                  by_surface, out.parts};
+  place_parts(objects, solid, placing, out);
+  if (!by_surface) return out;
+  rendering::SceneSurface placed{nullptr, alone ? first.pose : Pose{}, solid.front(), {}};
   std::vector<rendering::SurfaceShell> shells;
-  add_shells(spec, Pose{}, true, shells);
+  for (const int object : solid) {
+    const stimuli::ObjectSpec& spec = objects[static_cast<std::size_t>(object)];
+    add_shells(spec, alone ? Pose{} : spec.pose, true, shells);
+    placed.of_shell.resize(shells.size(), object);
+  }
   if (shells.empty()) {
     out.solids.clear();  // its parts without force serve as solids
     return out;
   }
-  const stimuli::Material& m = spec.material;
+  const stimuli::Material& m = first.material;
   std::string key;
-  if (spec.shape == stimuli::ShapeKind::mesh) {
-    key = shape_key(spec, false);
+  if (alone && first.shape == stimuli::ShapeKind::mesh) {
+    key = shape_key(first, false);
     for (const double value : {m.stiffness, m.damping, m.friction_static, m.friction_dynamic})
       key += ' ' + key_of(value);
-    if (const auto known = surfaces_.find(key); known != surfaces_.end()) surface = known->second;
+    if (const auto known = surfaces_.find(key); known != surfaces_.end())
+      placed.surface = known->second;
   }
-  if (surface == nullptr) surface = std::make_shared<const rendering::Surface>(shells);
-  if (!key.empty()) surfaces_.emplace(key, surface);
-  out.surfaces.push_back({std::move(surface), spec.pose, object});
+  if (placed.surface == nullptr)
+    placed.surface = std::make_shared<const rendering::Surface>(shells);
+  if (!key.empty()) surfaces_.emplace(key, placed.surface);
+  out.surfaces.push_back(std::move(placed));
   return out;
 }
 
@@ -441,26 +564,27 @@ rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& obj
   std::vector<rendering::SceneSurface> surfaces;
   std::vector<std::shared_ptr<const rendering::SoftObject>> soft;
   std::vector<std::string> faults;
-  for (std::size_t i = 0; i < objects.size(); ++i) {
+  for (const std::vector<int>& solid : solids_of(objects)) {
+    const auto index = static_cast<std::size_t>(solid.front());
+    const stimuli::ObjectSpec& first = objects[index];
     try {
-      const int object = static_cast<int>(i);
-      const Placed placed_here = placed(objects[i], object, side_contact, met_by(objects, i));
+      const Placed placed_here = placed(objects, solid, side_contact);
       const std::vector<rendering::SceneObject>& own = placed_here.parts;
       shown.insert(shown.end(), own.begin(), own.end());
-      if (objects[i].soft) {
-        soft.push_back(rendering::build_soft_object(objects[i], objects[i].pose,
-                                                    {soft_radius, gravity, object}));
+      if (first.soft) {
+        try {
+          soft.push_back(rendering::build_soft_object(first, first.pose,
+                                                      {soft_radius, gravity, solid.front()}));
+        } catch (const stimuli::MeshError& error) {
+          throw stimuli::MeshError(at_object(objects, index, error.faults()));
+        }
       } else {
         parts.insert(parts.end(), own.begin(), own.end());
         surfaces.insert(surfaces.end(), placed_here.surfaces.begin(), placed_here.surfaces.end());
         solids.insert(solids.end(), placed_here.solids.begin(), placed_here.solids.end());
       }
     } catch (const stimuli::MeshError& error) {
-      std::string where = "/objects/" + std::to_string(i);
-      if (!objects[i].file.empty()) where += " (" + objects[i].file + ")";
-      for (const auto& fault : error.faults()) {
-        faults.push_back(where + (fault.starts_with('/') ? "" : ": ") + fault);
-      }
+      faults.insert(faults.end(), error.faults().begin(), error.faults().end());
     }
   }
   if (!faults.empty()) throw stimuli::MeshError(std::move(faults));

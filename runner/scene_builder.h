@@ -55,6 +55,9 @@ class SceneBuilder {
   rendering::Scene build(const std::vector<stimuli::ObjectSpec>& objects, bool side_contact,
                          const rendering::Tool& tool = {}, const Vec3& gravity = Vec3(0),
                          double soft_radius = protocols::kSoftRadius);
+  /// The indices of all objects, in sets that one ideal tool feels: fixed objects that touch or
+  /// cross each other, and each other object alone.
+  std::vector<std::vector<int>> solids_of(const std::vector<stimuli::ObjectSpec>& objects);
   /// Those of the objects that move. \throws MeshError
   std::vector<rendering::MovingObject> moving_of(const std::vector<stimuli::ObjectSpec>& objects);
 
@@ -67,6 +70,7 @@ class SceneBuilder {
   struct PlacedShape {
     const stimuli::ObjectSpec* spec;
     Pose pose;
+    int object;
   };
   using Meshes = std::vector<std::shared_ptr<const stimuli::ConvexMesh>>;
   static std::vector<Prepared> with_trees(const Meshes& meshes, bool side_contact);
@@ -78,21 +82,24 @@ class SceneBuilder {
   const std::vector<Prepared>& prepare(const stimuli::ObjectSpec& spec, double depth,
                                        bool side_contact);
   struct Placing;
-  void place(const stimuli::ObjectSpec& spec, const Pose& parent, Placing& placing);
+  void place(const stimuli::ObjectSpec& spec, const Pose& parent, int object, Placing& placing);
   struct Placed {
     std::vector<rendering::SceneObject> parts;
     std::vector<rendering::SceneSurface> surfaces;
     std::vector<rendering::SceneObject> solids;  ///< of its surfaces, for collisions
   };
-  /// \param meets  what it may collide with, for messages; empty: nothing
-  Placed placed(const stimuli::ObjectSpec& spec, int object, bool side_contact,
-                const std::string& meets);
+  /// \param solid  indices of one object, or of all those that touch each other
+  Placed placed(const std::vector<stimuli::ObjectSpec>& objects, const std::vector<int>& solid,
+                bool side_contact);
+  void place_parts(const std::vector<stimuli::ObjectSpec>& objects, const std::vector<int>& solid,
+                   Placing& placing, Placed& out);
+  void add_corners(const stimuli::ObjectSpec& spec, const Pose& parent, std::vector<Vec3>& corners);
   /// Whether the object is felt as one closed surface, not as convex parts.
   bool is_surface(const stimuli::ObjectSpec& spec);
   bool has_concave(const stimuli::ObjectSpec& spec);
   void add_shells(const stimuli::ObjectSpec& spec, const Pose& in_object, bool felt,
                   std::vector<rendering::SurfaceShell>& shells);
-  void place_layers(Placing& placing);
+  void place_layers(int object, Placing& placing);
   std::vector<Prepared> layer_of(const std::vector<PlacedShape>& shapes, double depth,
                                  const Placing& placing, Pose& pose);
 

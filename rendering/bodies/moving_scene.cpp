@@ -967,7 +967,7 @@ Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObjec
   std::copy_if(parts.begin(), parts.end(), std::back_inserter(collide),
                [&](const SceneObject& part) {
                  return part.layer <= 0 &&
-                        std::none_of(surfaces.begin(), surfaces.end(), is_of(part.object));
+                        std::none_of(surfaces.begin(), surfaces.end(), is_of(part.own_solid()));
                });
   std::move(solids.begin(), solids.end(), std::back_inserter(collide));
   std::vector<Scene> shapes;

@@ -357,7 +357,10 @@ TEST(SceneBuilder, FilesThatAbutWithAStepOfRoundingAreOneSurface) {
   const auto higher = block("higher.obj", 0.05, 0.08, 0.0123458);
   EXPECT_EQ(SceneBuilder().build({compound({left, level})}, true).parts().size(), 2U);
   EXPECT_EQ(SceneBuilder().build({compound({left, higher})}, true).surfaces().size(), 1U);
-  EXPECT_EQ(SceneBuilder().build({left, higher}, true).surfaces().size(), 0U) << "two objects";
+  EXPECT_EQ(SceneBuilder().build({left, higher}, true).surfaces().size(), 1U) << "two objects";
+  stimuli::ObjectSpec apart = higher;
+  apart.pose.position.x = 0.01;
+  EXPECT_EQ(SceneBuilder().build({left, apart}, true).surfaces().size(), 0U);
 }
 
 TEST(SceneBuilder, ReadsAMeshFileOnceForAllItsScenes) {

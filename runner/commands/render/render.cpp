@@ -145,7 +145,7 @@ Explanation explain_with_costs(const rendering::Scene& scene, const rendering::R
   }
   explanation.surfaces = scene.surfaces().size();
   for (const rendering::PlacedSurface& placed : scene.surfaces()) {
-    objects.insert(placed.object);
+    objects.insert(placed.of_shell.begin(), placed.of_shell.end());
     explanation.facets += placed.surface->triangles().size();
     explanation.edges += placed.surface->triangles().size() / 2 * 3;
   }
