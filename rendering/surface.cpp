@@ -94,7 +94,7 @@ Surface::Surface(std::span<const SurfaceShell> shells) {
   std::size_t vertices = 0, triangles = 0;
   for (const SurfaceShell& shell : shells) {
     vertices += shell.surface->vertices.size();
-    triangles += shell.surface->triangles.size();
+    triangles += shell.surface->triangles.size() + shell.surface->at_pockets.size();
   }
   vertices_.reserve(vertices);
   triangles_.reserve(triangles);
@@ -160,6 +160,34 @@ void Surface::add(const SurfaceShell& shell) {
     t.normal = normal_of_neighbours(i, vertices_, triangles_);
     t.offset = glm::dot(t.normal, vertices_[t.corners[0]]);
   }
+  add_backs(shell.surface->at_pockets, base);
+}
+
+/// Adds the reverse of each triangle that may bound a pocket. Between the two no tool gets into it,
+/// as if it were solid. Where they bound solid, the reverse is seen from inside only.
+/// \param first  of the shell's triangles
+void Surface::add_backs(std::span<const std::uint32_t> at_pockets, std::uint32_t first) {
+  const auto back = static_cast<std::uint32_t>(triangles_.size());
+  for (const std::uint32_t i : at_pockets) {
+    SurfaceTriangle t = triangles_[first + i];
+    std::swap(t.corners[1], t.corners[2]);
+    t.normal = -t.normal;
+    t.offset = -t.offset;
+    t.touched = SurfaceTriangle::kBack;
+    for (std::uint32_t k = 0; k < 3; ++k) {
+      const std::uint32_t across = triangles_[first + i].across[2 - k];
+      const auto beyond =
+          std::ranges::lower_bound(at_pockets, SurfaceTriangle::triangle_of(across) - first);
+      if (beyond != at_pockets.end() && *beyond == SurfaceTriangle::triangle_of(across) - first) {
+        t.across[k] = (back + static_cast<std::uint32_t>(beyond - at_pockets.begin())) << 2 |
+                      (2 - SurfaceTriangle::side_of(across));
+      } else {
+        t.across[k] = (first + i) << 2 | (2 - k);
+        t.touched |= 1U << (6 + k);
+      }
+    }
+    triangles_.push_back(t);
+  }
 }
 
 void Surface::find_edges() {
@@ -167,6 +195,7 @@ void Surface::find_edges() {
     const Vec3 &a = vertices_[t.corners[0]], &b = vertices_[t.corners[1]],
                &c = vertices_[t.corners[2]];
     for (std::uint32_t k = 0; k < 3; ++k) {
+      if (t.ends(k)) continue;
       const SurfaceTriangle& other = triangles_[SurfaceTriangle::triangle_of(t.across[k])];
       const std::uint32_t apex = other.corners[(SurfaceTriangle::side_of(t.across[k]) + 2) % 3];
       // Positive if the neighbour's far corner is below this triangle's plane.
@@ -177,6 +206,7 @@ void Surface::find_edges() {
   // Both triangles of an edge must agree.
   for (std::uint32_t i = 0; i < triangles_.size(); ++i) {
     for (std::uint32_t k = 0; k < 3; ++k) {
+      if (triangles_[i].ends(k)) continue;
       const std::uint32_t across = triangles_[i].across[k];
       SurfaceTriangle& other = triangles_[SurfaceTriangle::triangle_of(across)];
       const std::uint32_t side = SurfaceTriangle::side_of(across);
@@ -247,6 +277,7 @@ void Surface::sort_by(std::span<const std::uint32_t> order) {
   rename(rename, root_);
   triangles_ = std::move(triangles);
   vertices_ = std::move(vertices);
+  std::erase_if(file_order_, [&](std::uint32_t i) { return triangles_[i].is_back(); });
 }
 
 /// Divides the triangles among the children of a new node. All nodes are full, except for the last
@@ -340,6 +371,7 @@ int Surface::winding(const Vec3& point) const {
     bool clear = true;
     near_segment(point, way, [&](std::uint32_t index) {
       const SurfaceTriangle& t = triangles_[index];
+      if (t.is_back()) return true;
       const Vec3 a = vertices_[t.corners[0]] - point, b = vertices_[t.corners[1]] - point,
                  c = vertices_[t.corners[2]] - point;
       const double sides[3] = {glm::dot(way, glm::cross(a, b)), glm::dot(way, glm::cross(b, c)),

@@ -24,6 +24,8 @@ struct alignas(64) SurfaceTriangle {
   std::array<std::uint32_t, 3> across{};
   std::uint32_t shell = 0;  ///< index in Surface::materials()
   /// Bit k: side k is not concave, so a segment can touch it, or folded. Bit 3 + k: it is folded.
+  /// Bit 6 + k: nothing lies beyond side k of a back. Bit 9: it is a back, the reverse of another
+  /// triangle, so that no tool gets into a pocket (ClosedSurface::at_pockets).
   std::uint16_t touched = 0;
   std::uint16_t owned = 0;  ///< bit k: of the two triangles at side k it is the first in its file
 
@@ -31,6 +33,9 @@ struct alignas(64) SurfaceTriangle {
   static constexpr std::uint32_t side_of(std::uint32_t side) { return side & 3; }
   bool touches(std::uint32_t k) const { return (touched >> k & 1) != 0; }
   bool folded(std::uint32_t k) const { return (touched >> (3 + k) & 1) != 0; }
+  bool ends(std::uint32_t k) const { return (touched >> (6 + k) & 1) != 0; }
+  bool is_back() const { return (touched & kBack) != 0; }
+  static constexpr std::uint16_t kBack = 1U << 9;
   bool owns(std::uint32_t k) const { return (owned >> k & 1) != 0; }
 };
 
@@ -100,7 +105,7 @@ class Surface {
   template <class Visit>
   void touchable(const SegmentMotion& motion, const Visit& visit) const;
 
-  /// Indices in triangles() in the order of the files.
+  /// Indices in triangles() in the order of the files, without backs.
   const std::vector<std::uint32_t>& file_order() const { return file_order_; }
 
   /// How often the surface winds round a point that does not lie on it.
@@ -108,6 +113,7 @@ class Surface {
 
  private:
   void add(const SurfaceShell& shell);
+  void add_backs(std::span<const std::uint32_t> at_pockets, std::uint32_t first);
   double widest_seam() const;
   template <class Visit>
   void near_box(const Vec3& low, const Vec3& high, const Visit& visit) const;

@@ -78,7 +78,7 @@ void SharpEdges::add_surface(const rendering::PlacedSurface& placed) {
   }
   // Vertices that no sharp edge ends in, but whose triangles differ.
   std::vector<std::vector<std::uint32_t>> fans(surface.vertices().size());
-  for (std::uint32_t i = 0; i < triangles.size(); ++i) {
+  for (const std::uint32_t i : surface.file_order()) {
     for (const std::uint32_t corner : triangles[i].corners) {
       if (!on_edge[corner]) fans[corner].push_back(i);
     }

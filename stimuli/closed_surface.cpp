@@ -65,8 +65,17 @@ class Cleaner {
            (std::string("corners, each") + text).c_str());
     }
     ClosedSurface surface = take_surface();
-    check_winding(surface, kFlatErrors * error_,
-                  [&](Index t) { return name_of_face(soup_, face_[t]); });
+    Pockets pockets = check_winding(surface, kFlatErrors * error_,
+                                    [&](Index t) { return name_of_face(soup_, face_[t]); });
+    if (pockets.depth > 0) {
+      char text[200];
+      std::snprintf(text, sizeof text,
+                    "it passes through itself, at (%.6g, %.6g, %.6g) m by %.2g m: no hand can feel "
+                    "that",
+                    pockets.place.x, pockets.place.y, pockets.place.z, pockets.depth);
+      notes_.emplace_back(text);
+    }
+    surface.at_pockets = std::move(pockets.triangles);
     return {std::move(surface), std::move(notes_)};
   }
 

@@ -14,8 +14,8 @@
 namespace palpate::stimuli {
 
 /// Every side of a triangle has one neighbour, which runs along it the opposite way. The solid is
-/// where the surface winds round a point a positive number of times; it nowhere winds round one a
-/// negative number of times.
+/// where the surface winds round a point a positive number of times. It winds round a point a
+/// negative number of times only in pockets that no hand can feel.
 struct ClosedSurface {
   std::vector<Vec3> vertices;  ///< m; no two at the same place, each in some triangle
   /// Counter-clockwise seen from outside; three different corners, never in one line.
@@ -24,6 +24,8 @@ struct ClosedSurface {
   /// in an edge, each two neighbours have solid between them.
   std::vector<std::array<std::uint32_t, 3>> across;
   double coordinate_error = 0;  ///< m, of each coordinate as its file rounds it; 0: not rounded
+  /// Triangles that may bound a pocket, or a part of each does: there is no solid behind that part.
+  std::vector<std::uint32_t> at_pockets = {};
 };
 
 /// The surface that polygons bound, and what was done to them to get it.
@@ -47,11 +49,20 @@ std::vector<std::uint32_t> weld_equal(const std::vector<Vec3>& points);
 /// cluster). Points at most `tolerance` (m) apart are one; all coordinates must be finite.
 std::vector<std::uint32_t> weld(const std::vector<Vec3>& points, double tolerance);
 
+/// Pockets, where a surface winds round a place a negative number of times, because it passes
+/// through itself.
+struct Pockets {
+  std::vector<std::uint32_t> triangles;  ///< as of ClosedSurface::at_pockets
+  double depth = 0;                      ///< m, of the deepest
+  Vec3 place;                            ///< m, in that one
+};
+
 /// \param tolerance  m; places that are not farther than this from the surface do not count
 /// \param name  of a triangle, for messages
+/// \return pockets that no hand can feel
 /// \throws MeshError: a shell is turned inside out and in no other, the surface passes through
 /// itself so that it winds round a place a negative number of times, there is no volume
-void check_winding(const ClosedSurface& surface, double tolerance,
-                   const std::function<std::string(std::uint32_t triangle)>& name);
+Pockets check_winding(const ClosedSurface& surface, double tolerance,
+                      const std::function<std::string(std::uint32_t triangle)>& name);
 
 }  // namespace palpate::stimuli

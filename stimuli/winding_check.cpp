@@ -230,13 +230,15 @@ class WindingCheck {
                const std::function<std::string(Index)>& name)
       : surface_(surface), tolerance_(tolerance), name_(name) {}
 
-  void run() {
+  Pockets run() {
     check_shells();
     faults_.throw_if_any();
     sheet_ = sheets_of(surface_, tolerance_);
     // Shells that bound solids and do not pass through themselves add up to no negative number,
     // wherever they pass through each other.
-    if (all_bound_solids_ && are_simple()) return;
+    if (all_bound_solids_ && are_simple()) return {};
+    felt_ = felt_depth();
+    at_pocket_.assign(surface_.triangles.size(), 0);
     shell_.assign(shell_.size(), 0);
     tree_.emplace(surface_, shell_, sheet_);
     // Over triangles that cross no others, the number does not change from one to its neighbour.
@@ -245,6 +247,7 @@ class WindingCheck {
     faults_.throw_if_any();
     check_regions();
     faults_.throw_if_any();
+    return pockets();
   }
 
  private:
@@ -344,8 +347,42 @@ class WindingCheck {
     return angle / (2 * 3.14159265358979323846) < -0.5;
   }
 
+  // m; a deeper pocket is refused. Files in other units are larger than what a hand can reach.
+  double felt_depth() const {
+    constexpr double kOfSize = 1e-3, kDepth = 1e-4, kOfLarge = 1e-4;
+    Box all;
+    for (const Vec3& v : surface_.vertices) all.add(v);
+    const double size = glm::length(all.high - all.low);
+    return std::min(kOfSize * size, std::max(kDepth, kOfLarge * size));
+  }
+
+  // m; how far a pocket reaches from a place in it along a direction; more than felt_: infinity.
+  double depth_of(const Vec3& q, const Vec3& direction) const {
+    constexpr int kHalvings = 24, kRefinements = 10;
+    for (int k = kHalvings; k >= 0; --k) {
+      double out = std::ldexp(felt_, -k), in = k == kHalvings ? 0 : 0.5 * out;
+      if (winding(q + out * direction) < 0) continue;
+      for (int i = 0; i < kRefinements; ++i) {
+        const double middle = 0.5 * (in + out);
+        (winding(q + middle * direction) < 0 ? in : out) = middle;
+      }
+      return out;
+    }
+    return std::numeric_limits<double>::infinity();
+  }
+
+  // Looks for a pocket outside a triangle.
   void examine(const Vec3& q, Index t, const char* why) {
-    if (winding(q) >= 0 || accused_ > 32) return;
+    if (winding(q) >= 0) return;
+    const double depth = depth_of(q, glm::normalize(area(t)));
+    if (depth <= felt_) {
+      at_pocket_[t] = 1;
+      if (depth <= deepest_.depth) return;
+      deepest_.depth = depth;
+      deepest_.place = q;
+      return;
+    }
+    if (accused_ > 32) return;
     ++accused_;
     if (!truly_negative(q)) return;
     faults_.add("negative", [&] {
@@ -369,7 +406,9 @@ class WindingCheck {
       }
       if (seen[t] != 0) continue;
       std::array<std::pair<double, Index>, 3> largest{};
+      std::vector<Index> region;
       flood(t, seen, [&](Index s) {
+        region.push_back(s);
         const double size = glm::length(area(s));
         if (size > largest[2].first) largest[2] = {size, s};
         if (largest[2].first > largest[1].first) std::swap(largest[2], largest[1]);
@@ -378,7 +417,48 @@ class WindingCheck {
       for (const auto& [size, s] : largest) {
         if (size > 0) examine_over(s, "a shell there is turned inside out");
       }
+      const bool is_pocket = std::ranges::any_of(
+          largest, [&](const auto& one) { return one.first > 0 && at_pocket_[one.second] != 0; });
+      for (const Index s : region) {
+        if (!is_pocket || !faults_.empty()) break;
+        examine_all_over(s);
+        at_pocket_[s] = 1;
+      }
     }
+    if (deepest_.depth == 0) return;
+    for (Index t = 0; t < crossed_.size() && faults_.empty(); ++t) {
+      if (crossed_[t] != 0) examine_all_over(t);
+    }
+  }
+
+  // Places above a triangle: its middle, between its corners, and ever nearer to them, as pockets
+  // are deepest there and may be small.
+  void examine_all_over(Index t) {
+    constexpr std::array<double, 4> kInwards = {1e-3, 1e-4, 1e-5, 1e-6};
+    const Vec3 twice = area(t), centre = middle(t);
+    const double size = glm::length(twice);
+    if (!(size > 0)) return;
+    for (Index i = 0; i <= 3; ++i) {
+      for (Index k = 0; i + k <= 3; ++k) {
+        const Vec3 at = (double(i) * corner(t, 0) + double(k) * corner(t, 1) +
+                         double(3 - i - k) * corner(t, 2)) /
+                        3.0;
+        for (const double inwards : kInwards) {
+          examine(at + inwards * (centre - at) + twice * (2 * tolerance_ / size), t,
+                  "it passes through itself");
+        }
+      }
+    }
+  }
+
+  Pockets pockets() {
+    if (deepest_.depth == 0) return {};
+    if (!truly_negative(deepest_.place)) deepest_.depth = 0;
+    // A part of a triangle that crosses others may bound a pocket.
+    for (Index t = 0; t < at_pocket_.size(); ++t) {
+      if (at_pocket_[t] != 0 || crossed_[t] != 0) deepest_.triangles.push_back(t);
+    }
+    return std::move(deepest_);
   }
 
   void examine_over(Index t, const char* why) {
@@ -547,15 +627,18 @@ class WindingCheck {
   bool all_bound_solids_ = true;  ///< none is turned inwards
   bool in_shells_ = false;        ///< look only for shells that pass through themselves
   std::vector<char> crossed_;
+  double felt_ = 0;  ///< m
+  std::vector<char> at_pocket_;
+  Pockets deepest_;
   std::size_t budget_ = 0;
   int accused_ = 0;
 };
 
 }  // namespace
 
-void check_winding(const ClosedSurface& surface, double tolerance,
-                   const std::function<std::string(Index)>& name) {
-  WindingCheck(surface, tolerance, name).run();
+Pockets check_winding(const ClosedSurface& surface, double tolerance,
+                      const std::function<std::string(Index)>& name) {
+  return WindingCheck(surface, tolerance, name).run();
 }
 
 }  // namespace palpate::stimuli

@@ -248,7 +248,7 @@ class LineMoments {
     const Vec3 start = from + out_.about;
     surface_.near_segment(start, way, [&](std::uint32_t index) {
       const SurfaceTriangle& t = surface_.triangles()[index];
-      if (t.normal.z == 0) return true;
+      if (t.normal.z == 0 || t.is_back()) return true;
       bool in = true, out = true;
       for (std::size_t k = 0; k < 3; ++k) {
         const Vec3 a = surface_.vertices()[t.corners[k]] - start;

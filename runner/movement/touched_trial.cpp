@@ -37,8 +37,10 @@ void add_surface(const rendering::PlacedSurface& placed, std::vector<SurfaceTria
   const auto world = [&placed](std::uint32_t vertex) {
     return placed.world_vector(placed.surface->vertices()[vertex]) + placed.position;
   };
-  for (const rendering::SurfaceTriangle& t : placed.surface->triangles())
+  for (const std::uint32_t i : placed.surface->file_order()) {
+    const rendering::SurfaceTriangle& t = placed.surface->triangles()[i];
     triangles.push_back({world(t.corners[0]), world(t.corners[1]), world(t.corners[2])});
+  }
 }
 
 bool inside(const rendering::ScenePart& part, const Vec3& place) {

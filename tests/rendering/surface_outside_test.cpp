@@ -189,6 +189,31 @@ PolygonSoup abutting_blocks(Random& random) {
   return soup;
 }
 
+constexpr double kPocket = 2e-5;  // m
+
+/// A plate whose upper side passes through the lower one in some corners, by less than a hand
+/// feels, and lies over itself beside others.
+PolygonSoup folded_plate(Random& random) {
+  constexpr int kCells = 10;
+  const double thick = uniform(random, 5e-4, 2e-3), cell = 0.004;
+  std::vector<Vec3> moved;
+  for (int i = 0; i < (kCells + 1) * (kCells + 1); ++i) {
+    const double kind = random.unit();
+    Vec3 by(0, 0, uniform(random, 0, 1e-4));
+    if (kind < 0.1) by.z = -thick - uniform(random, 1e-6, kPocket);
+    if (kind > 0.9) by.x = uniform(random, 1, 1.005) * cell;
+    moved.push_back(by);
+  }
+  return lattice(
+      {kCells, kCells, 1}, [](const Cell&) { return true; },
+      [&](const Cell& c) {
+        const bool inside = c.x > 0 && c.x < kCells && c.y > 0 && c.y < kCells;
+        const Vec3 at(cell * c.x, cell * c.y, thick * c.z);
+        return c.z == 1 && inside ? at + moved[static_cast<std::size_t>(c.x + (kCells + 1) * c.y)]
+                                  : at;
+      });
+}
+
 enum class Written { single_precision, six_decimals, eight_decimals };
 
 /// Rounds coordinates as a file does.
@@ -313,7 +338,7 @@ void SurfaceOutside::touch(const Segments& segments, std::uint64_t seed) {
   const std::vector<SurfaceShell> shells = {{mesh, Pose{}, spring}};
   const auto surface = std::make_shared<const Surface>(shells);
   const double rounding = 1e-9 * oracle.size();  // m; places nearer to the outside are not judged
-  const double farther = 2e-6 + 4 * surface->seam();
+  const double farther = 2e-6 + 4 * surface->seam() + (kind.make == folded_plate ? kPocket : 0);
   const auto inside = [&](const Pose& at, double depth) {
     return std::any_of(segments.begin(), segments.end(), [&](const auto& s) {
       return oracle.holds({at.position + at.orientation * s[0], at.orientation * (s[1] - s[0])},
@@ -366,8 +391,11 @@ void SurfaceOutside::touch(const Segments& segments, std::uint64_t seed) {
     bool is_noticed = false;
     for (int k = 0; k < 100 && !is_noticed; ++k) {
       const Vec3 in = -glm::normalize(r.force) + 0.01 * k * random_direction(random);
-      is_noticed =
-          inside({ideal.position + farther * glm::normalize(in), ideal.orientation}, rounding);
+      const auto moved = [&](double by) { return ideal.position + by * glm::normalize(in); };
+      is_noticed = inside({moved(farther), ideal.orientation}, rounding);
+      // A pocket plugs the hole that it is the bottom of.
+      for (double by = 1e-8; by < kPocket && !is_noticed; by *= 2)
+        is_noticed = oracle.winding(moved(by)) < 0;
     }
     noticed += is_noticed ? 1 : 0;
   }
@@ -503,7 +531,8 @@ INSTANTIATE_TEST_SUITE_P(
         Kind{"LatticeOfStruts", lattice_of_struts, false, Written::eight_decimals},
         Kind{"MountingPlate", mounting_plate, true, Written::eight_decimals},
         Kind{"AbuttingBlocks", abutting_blocks, true, Written::six_decimals},
-        Kind{"EightCells", rounded_cube_of_eight_cells, true, Written::eight_decimals}),
+        Kind{"EightCells", rounded_cube_of_eight_cells, true, Written::eight_decimals},
+        Kind{"FoldedPlate", folded_plate, true, Written::eight_decimals}),
     [](const auto& kind) { return std::string(kind.param.name); });
 
 }  // namespace outside

@@ -393,6 +393,45 @@ TEST(ClosedSurfaceTest, ASmallRegionOfNegativeWindingIsFoundInALargeMesh) {
   EXPECT_NE(refusal_of(sphere).find("negative: face "), std::string::npos);
 }
 
+// A plate whose upper side is pushed through the lower one in one corner of its grid.
+PolygonSoup pierced_plate(double depth) {
+  constexpr double kEdge = 0.04, kThick = 1e-3;  // m
+  PolygonSoup soup;
+  soup.vertices = {{0, 0, 0}, {kEdge, 0, 0}, {kEdge, kEdge, 0}, {0, kEdge, 0}};
+  for (int i = 0; i < 4; ++i) soup.vertices.push_back(soup.vertices[i] + Vec3(0, 0, kThick));
+  soup.vertices.emplace_back(0.021, 0.018, -depth);
+  soup.faces = {{3, 2, 1, 0}};
+  for (std::uint32_t k = 0; k < 4; ++k) {
+    const std::uint32_t next = (k + 1) % 4;
+    soup.faces.push_back({k, next, next + 4, k + 4});
+    soup.faces.push_back({k + 4, next + 4, 8});
+  }
+  return soup;
+}
+
+TEST(ClosedSurfaceTest, APocketThatNoHandFeelsIsNoted) {
+  for (const double depth : {1e-7, 1e-6, 2e-5, 5e-5}) {
+    const stimuli::CleanedSurface cleaned = closed_surface(pierced_plate(depth));
+    ASSERT_EQ(cleaned.notes.size(), 2U);  // the other one: quadrangles are cut
+    double x = 0, y = 0, z = 0, deep = 0;
+    ASSERT_EQ(
+        std::sscanf(cleaned.notes.back().c_str(),
+                    "it passes through itself, at (%lf, %lf, %lf) m by %lf m", &x, &y, &z, &deep),
+        4)
+        << cleaned.notes.back();
+    EXPECT_NEAR(deep, depth, 0.1 * depth);
+    EXPECT_NEAR(x, 0.021, 0.002);
+    EXPECT_NEAR(y, 0.018, 0.002);
+    EXPECT_GT(cleaned.surface.at_pockets.size(), 4U);
+  }
+  EXPECT_TRUE(closed_surface(pierced_plate(-1e-6)).surface.at_pockets.empty());
+}
+
+TEST(ClosedSurfaceTest, APocketThatAHandFeelsIsRefused) {
+  for (const double depth : {1.2e-4, 5e-4, 1e-3})
+    EXPECT_NE(refusal_of(pierced_plate(depth)).find("negative: "), std::string::npos) << depth;
+}
+
 // The triangles of such faces are long, so that all their boxes meet.
 TEST(ClosedSurfaceTest, FacesOfManyTrianglesAreTaken) {
   // A toothed wheel whose ends are fans, and a ring.
