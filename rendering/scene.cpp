@@ -90,6 +90,7 @@ Scene::Scene(std::vector<SceneObject> objects, bool side_contact, Tool tool,
                                 [](const PartGroup& group) { return group.by_law; });
   features.several_parts = parts_.size() != 1 || features.unions;
   features_index_ = features.index();
+  is_one_surface_ = parts_.empty() && surfaces_.size() == 1 && tool_.segments.empty();
   if (motion_) features_index_ += TickFeatures::kCount;
 }
 

@@ -206,6 +206,8 @@ class Scene {
   /// The bounding sphere of all parts below each node of the tree.
   const std::vector<Sphere>& node_spheres() const { return node_spheres_; }
   double mean_radius() const { return mean_radius_; }  ///< m, of the parts' bounding spheres
+  /// Whether it is one closed surface, felt with the plain stylus, and nothing else.
+  bool is_one_surface() const { return is_one_surface_; }
   std::size_t segments() const { return tool_.segments.empty() ? 1 : tool_.segments.size(); }
   RenderState initial_state() const;
 
@@ -225,6 +227,7 @@ class Scene {
   double tool_reach_ = 0;
   Tool tool_;
   std::size_t features_index_ = 0;
+  bool is_one_surface_ = false;
   std::shared_ptr<const SceneMotion> motion_;
   BoundingTree part_tree_;
   std::vector<Sphere> node_spheres_;

@@ -299,7 +299,41 @@ bool SurfaceTool::virtual_inside() {
   return inside;
 }
 
+/// Whether a free stylus is out of reach, as far_away() finds first. Most ticks of a trial end
+/// here, so that nothing else is set up.
+[[gnu::always_inline]] inline bool stylus_is_far(const UnionTick& tick, const PlacedSurface& placed,
+                                                 const SurfaceState& own) {
+  const Vec3 d = tick.sides ? tick.tool.d : Vec3(0);
+  const ToolPose& last_pose = tick.state.has_last ? tick.state.unions.last : tick.tool;
+  const Vec3 last_d = tick.sides ? last_pose.d : Vec3(0);
+  const Vec3 start = placed.local_point(tick.tool.tip), along = placed.local_vector(d);
+  const Vec3 start_before = placed.local_point(last_pose.tip),
+             along_before = placed.local_vector(last_d);
+  const auto far2 = [](const Vec3& a, const Vec3& a_along, const Vec3& b, const Vec3& b_along) {
+    const Vec3 apart = b - a, ends = apart + b_along - a_along;
+    return std::max(glm::dot(apart, apart), glm::dot(ends, ends));
+  };
+  if (own.clear_room > 0) {
+    const PosedTool::Segment& clear = own.clear.segments[0];
+    if (std::max(far2(clear.start, clear.along, start_before, along_before),
+                 far2(clear.start, clear.along, start, along)) < own.clear_room * own.clear_room)
+      return true;
+  }
+  const double step = std::sqrt(far2(start_before, along_before, start, along));
+  const Vec3 to = placed.surface->centre() - start;
+  const double length2 = glm::dot(along, along);
+  const double t = length2 > 0 ? std::clamp(glm::dot(to, along) / length2, 0.0, 1.0) : 0.0;
+  const Vec3 apart = to - t * along;
+  const double near = placed.surface->radius() + step + 2 * placed.skin;
+  return glm::dot(apart, apart) > near * near;
+}
+
 void follow_on_surface(UnionTick& tick, std::uint32_t surface) {
+  const PlacedSurface& placed = tick.scene.surfaces()[surface];
+  const UnionMemory& all = tick.state.unions;
+  if (!all.groups[placed.group].touching && !(tick.sides && tick.scene.tool() != nullptr) &&
+      stylus_is_far(tick, placed, all.surfaces[surface]))
+    return;
   SurfaceTool(tick, surface).follow();
 }
 
@@ -310,7 +344,7 @@ bool inside_surface(UnionTick& tick, std::uint32_t surface) {
 void SurfaceTool::add_contact(const SurfacePlane& plane, const Vec3& shift) {
   const PosedTool::Segment& segment = turned_.segments[plane.patch.segment];
   const SurfaceTriangle& triangle = surface_.triangles()[plane.patch.triangle()];
-  PlacedContact out;
+  PlacedContact& out = all_.contacts.emplace_back();
   LoadedContact& c = out.loaded;
   c.contact.normal = placed_.world_vector(plane.normal);
   c.contact.depth = glm::dot(plane.normal, shift);
@@ -348,7 +382,6 @@ void SurfaceTool::add_contact(const SurfacePlane& plane, const Vec3& shift) {
   out.group = group_;
   out.segment = plane.patch.segment;
   out.by_law = true;
-  all_.contacts.push_back(out);
 }
 
 /// Makes contacts of the planes that hold the tool, without the skin.
@@ -365,6 +398,7 @@ void SurfaceTool::add_contacts() {
 void SurfaceTool::remember(std::size_t first_contact) {
   remember_ideal_tool(tick_, group_, pose_, placed_.world_vector(at_), !planes_.empty() || stuck_,
                       first_contact);
+  if (!tick_.scene.features().friction) return;
   const PartGroup& group = tick_.scene.groups()[group_];
   for (SurfaceState::Rubbed& slot : own_.rubbed) slot.used = false;
   for (std::size_t i = first_contact; i < all_.contacts.size(); ++i) {

@@ -309,6 +309,26 @@ void add_placed_contacts(UnionTick& tick, Tick<Probe>& plain) {
   }
 }
 
+/// The same tick where one surface, felt with a plain stylus, is all that there is: no parts, tool,
+/// damping or friction.
+template <class Probe>
+Rendering render_surface(const Scene& scene, RenderState& state, const LineProbe& probe,
+                         double dt) noexcept {
+  UnionMemory& all = state.unions;
+  const ToolPose tool{probe.tip, probe.tail - probe.tip};
+  UnionTick tick{scene, state, tool, Probe::kSegment, dt};
+  update_objects(tick);
+  all.contacts.clear();
+  all.reach = 0;
+  all.most_lag = 0;
+  if (!is_off(tick, scene.groups().front())) follow_on_surface(tick, 0);
+  fade_forces(tick);
+  state.last = probe;
+  state.has_last = true;
+  all.last = tool;
+  return sum_unions(tick, probe);
+}
+
 /// A tick by the law of unions (union_contact.h).
 template <class Probe, TickFeatures kFeatures>
 Rendering render_unions(const Scene& scene, RenderState& state, const LineProbe& probe,
@@ -344,6 +364,9 @@ Rendering render_tick(const Scene& scene, RenderState& state, const LineProbe& p
                       double dt) noexcept {
   if (!within_range(probe.tip) || !within_range(probe.tail))
     return no_contact(state.last, render_fault::kNonFinite);
+  if constexpr (kFeatures.unions && kFeatures.plain_springs()) {
+    if (scene.is_one_surface()) return render_surface<Probe>(scene, state, probe, dt);
+  }
   if constexpr (kFeatures.unions) return render_unions<Probe, kFeatures>(scene, state, probe, dt);
   Tick<Probe> tick{scene, state, probe, Probe::kSegment ? glm::length(probe.tail - probe.tip) : 0};
   const auto finish = [&](std::span<LoadedContact> contacts) {

@@ -131,6 +131,13 @@ struct Plane {
 template <class Held>
 class PlanesOf {
  public:
+  PlanesOf() {}  // NOLINT(modernize-use-equals-default): that would be deleted
+  PlanesOf(const PlanesOf& other) { *this = other; }
+  PlanesOf& operator=(const PlanesOf& other) {
+    count_ = other.count_;
+    std::copy_n(other.planes_.begin(), count_, planes_.begin());
+    return *this;
+  }
   std::span<Held> all() { return {planes_.data(), count_}; }
   std::span<const Held> all() const { return {planes_.data(), count_}; }
   /// Null if there is no plane.
@@ -236,7 +243,9 @@ class PlanesOf {
     return true;
   }
 
-  std::array<Held, kMostPlanes> planes_;
+  union {  // only those in use are initialised
+    std::array<Held, kMostPlanes> planes_;
+  };
   std::size_t count_ = 0;
 };
 

@@ -741,6 +741,36 @@ TEST_P(SurfaceContact, AFineMeshIsNotEnteredByAStylusThatTurnsFast) {
   EXPECT_GT(contacts, 3000);
 }
 
+/// A part out of reach makes the tick a general one.
+TEST_P(SurfaceContact, ASurfaceAloneGivesTheBitsOfAnyScene) {
+  constexpr std::uint64_t kSeed = 23;
+  Random random(kSeed);
+  const SceneSurface placed = surface_of({torus(14, 8, 0.03, 0.01)});
+  const Scene alone({}, true, {}, nullptr, {placed});
+  const Scene any(object_of({stimuli::icosphere(0.01, 0)}, {Vec3(9, 0, 0), Quat(1, 0, 0, 0)}, 1, 1),
+                  true, {}, nullptr, {placed});
+  ASSERT_TRUE(alone.is_one_surface());
+  ASSERT_FALSE(any.is_one_surface());
+  RenderState a = alone.initial_state(), b = any.initial_state();
+  Hand hand(*placed.surface, random);
+  int contacts = 0, free = 0;
+  for (int i = 0; i < 8000; ++i) {
+    const LineProbe probe = hand.next();
+    const Rendering one = tick(alone, a, probe), other = tick(any, b, probe);
+    ASSERT_EQ(one.force, other.force) << i;
+    ASSERT_EQ(one.torque, other.torque) << i;
+    ASSERT_EQ(one.device2, other.device2) << i;
+    ASSERT_EQ(one.ideal.tip, other.ideal.tip) << i;
+    ASSERT_EQ(one.ideal.tail, other.ideal.tail) << i;
+    ASSERT_EQ(one.deepest.point, other.deepest.point) << i;
+    ASSERT_EQ(one.contacts, other.contacts) << i;
+    ASSERT_EQ(one.faults, other.faults) << i;
+    ++(one.contacts > 0 ? contacts : free);
+  }
+  EXPECT_GT(contacts, 1000);
+  EXPECT_GT(free, 100);
+}
+
 /// A hand that has come from outside in one tick is held where one is that came in small steps.
 TEST_P(SurfaceContact, AFirstContactIsThatOfSmallSteps) {
   constexpr int kApproaches = 300, kSteps = 32;
