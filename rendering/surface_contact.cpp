@@ -20,6 +20,7 @@ constexpr int kMostSteps = 64;                          // of a tick
 
 using PatchKind = SurfacePatch::Kind;
 
+constexpr double kLevel = 1e-12;    // sine; a segment along a triangle
 constexpr int kMostFaces = 64;      // to each side of a contact
 constexpr double kFlat = 1 - 5e-9;  // cosine of 1e-4 rad: rounding may bend a flat face so far
 
@@ -341,9 +342,36 @@ bool inside_surface(UnionTick& tick, std::uint32_t surface) {
   return SurfaceTool(tick, surface).virtual_inside();
 }
 
+/// Of all segments that touch the triangle with the same joint, the patch of the one that lies
+/// flattest. Which of them holds the tool depends on how it came; where it touches must not.
+SurfacePatch SurfaceTool::flattest(const SurfacePatch& patch) const {
+  if (patch.kind != PatchKind::face || turned_.count == 1) return patch;
+  const Vec3& normal = surface_.triangles()[patch.triangle()].normal;
+  const Vec3 joint = turned_.segments[patch.segment].end(patch.tail);
+  SurfacePatch best = patch;
+  double least = tick::kSinBlendAngle * tick::kSinBlendAngle;  // steeper ones touch at the joint
+  for (std::size_t j = 0; j < turned_.count; ++j) {
+    const PosedTool::Segment& segment = turned_.segments[j];
+    const double length2 = glm::dot(segment.along, segment.along);
+    for (const bool tail : {false, true}) {
+      const SurfacePatch other{patch.side, static_cast<std::uint8_t>(j), tail, PatchKind::face};
+      const Vec3 apart = segment.end(tail) - joint;
+      if (glm::dot(apart, apart) > tolerance_ * tolerance_ || !(length2 > 0)) continue;
+      const double slope = glm::dot(normal, segment.along), slope2 = slope * slope / length2;
+      // A level segment touches with both ends.
+      if (!(slope2 < least) || (slope2 > kLevel * kLevel && !exists(surface_, other, turned_)))
+        continue;
+      least = slope2;
+      best = other;
+    }
+  }
+  return best;
+}
+
 void SurfaceTool::add_contact(const SurfacePlane& plane, const Vec3& shift) {
-  const PosedTool::Segment& segment = turned_.segments[plane.patch.segment];
-  const SurfaceTriangle& triangle = surface_.triangles()[plane.patch.triangle()];
+  const SurfacePatch patch = flattest(plane.patch);
+  const PosedTool::Segment& segment = turned_.segments[patch.segment];
+  const SurfaceTriangle& triangle = surface_.triangles()[patch.triangle()];
   PlacedContact& out = all_.contacts.emplace_back();
   LoadedContact& c = out.loaded;
   c.contact.normal = placed_.world_vector(plane.normal);
@@ -356,10 +384,10 @@ void SurfaceTool::add_contact(const SurfacePlane& plane, const Vec3& shift) {
   c.contact.type = ContactType::point_polygon;
   const Vec3 tip = segment.start + shift;
   if (tick_.sides && segment.along != Vec3(0)) {
-    c.probe_fraction = plane.patch.tail ? 1 : 0;
-    if (plane.patch.kind == PatchKind::edge) {
+    c.probe_fraction = patch.tail ? 1 : 0;
+    if (patch.kind == PatchKind::edge) {
       c.contact.type = ContactType::segment_edge;
-      const std::uint32_t k = SurfaceTriangle::side_of(plane.patch.side);
+      const std::uint32_t k = SurfaceTriangle::side_of(patch.side);
       const Vec3& v0 = surface_.vertices()[triangle.corners[k]];
       const Vec3 e = surface_.vertices()[triangle.corners[(k + 1) % 3]] - v0;
       const Vec3 normal = glm::cross(e, segment.along);
@@ -368,19 +396,19 @@ void SurfaceTool::add_contact(const SurfacePlane& plane, const Vec3& shift) {
           size2 > 0 ? std::clamp(glm::dot(glm::cross(tip - v0, e), normal) / size2, 0.0, 1.0) : 0.5;
     }
     c.probe_fraction =
-        place_on(surface_, plane.patch, tip, segment.along, c.probe_fraction, c.contact.type);
+        place_on(surface_, patch, tip, segment.along, c.probe_fraction, c.contact.type);
   }
   out.shift = placed_.world_vector(shift);
-  const PlacedSegment ideal = place_segment(carried_, tick_.sides, pose_, plane.patch.segment);
+  const PlacedSegment ideal = place_segment(carried_, tick_.sides, pose_, patch.segment);
   out.place = tick_.tool.tip + out.shift + ideal.from + c.probe_fraction * ideal.along;
   if (tick_.state.has_last) {
-    const PlacedSegment now = place_segment(carried_, tick_.sides, tick_.tool, plane.patch.segment);
-    const PlacedSegment last = place_segment(carried_, tick_.sides, all_.last, plane.patch.segment);
+    const PlacedSegment now = place_segment(carried_, tick_.sides, tick_.tool, patch.segment);
+    const PlacedSegment last = place_segment(carried_, tick_.sides, all_.last, patch.segment);
     out.motion = tick_.tool.tip - all_.last.tip + (now.from + c.probe_fraction * now.along) -
                  (last.from + c.probe_fraction * last.along);
   }
   out.group = group_;
-  out.segment = plane.patch.segment;
+  out.segment = patch.segment;
   out.by_law = true;
 }
 

@@ -101,6 +101,7 @@ class SurfaceTool {
 
   // surface_contact.cpp
   void add_contacts();
+  SurfacePatch flattest(const SurfacePatch& patch) const;
   void add_contact(const SurfacePlane& plane, const Vec3& shift);
   void remember(std::size_t first_contact);
 

@@ -74,6 +74,7 @@ class IdealTool {
 
   // Contacts.
   void add_contacts();
+  const NearPair& flattest(const Plane& plane);
   void add_contact(const Plane& plane, const Vec3& shift);
   void spread_over_parts(const NearPair& carrying, const WalkResult& hit, const Vec3& tip,
                          LoadedContact& c);
@@ -118,8 +119,40 @@ void IdealTool::spread_over_parts(const NearPair& carrying, const WalkResult& hi
                     c);
 }
 
+/// Of all segments that touch the part's facet with the same joint, the pair of the one that lies
+/// flattest. Which of them holds the tool depends on how it came; where it touches must not.
+const NearPair& IdealTool::flattest(const Plane& plane) {
+  constexpr double kLevel = 1e-12;  // sine
+  const NearPair& held = pairs_[plane.near];
+  if (plane.feature.kind != Kind::facet || pairs_.oriented().count < 2) return held;
+  const ScenePart& part = pairs_.part_of(held);
+  const Vec3& normal = part.mesh->facets()[plane.feature.index].normal;
+  const auto deeper_end = [&](const NearPair& near) {
+    return glm::dot(normal, near.true_d) < 0 ? near.true_tip + near.true_d : near.true_tip;
+  };
+  const Vec3 joint = deeper_end(held);
+  const NearPair* best = &held;
+  double least = tick::kSinBlendAngle * tick::kSinBlendAngle;  // steeper ones touch at the joint
+  for (const NearPair& near : pairs_.all()) {
+    const double length2 = glm::dot(near.true_d, near.true_d);
+    if (near.part != held.part || !(length2 > 0)) continue;
+    const double slope = glm::dot(normal, near.true_d), slope2 = slope * slope / length2;
+    const auto is_joint = [&](const Vec3& end) {
+      return glm::distance(end, joint) <= part.tolerance;
+    };
+    // A level segment touches with both ends.
+    const bool touches = is_joint(deeper_end(near)) ||
+                         (slope2 <= kLevel * kLevel &&
+                          (is_joint(near.true_tip) || is_joint(near.true_tip + near.true_d)));
+    if (!touches || !(slope2 < least)) continue;
+    least = slope2;
+    best = &near;
+  }
+  return *best;
+}
+
 void IdealTool::add_contact(const Plane& plane, const Vec3& shift) {
-  const NearPair& near = pairs_[plane.near];
+  const NearPair& near = flattest(plane);
   const ScenePart& part = pairs_.part_of(near);
   const PlacedSegment& segment = pairs_.oriented().segments[near.segment];
   PlacedContact out;

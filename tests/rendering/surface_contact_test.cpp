@@ -741,6 +741,37 @@ TEST_P(SurfaceContact, AFineMeshIsNotEnteredByAStylusThatTurnsFast) {
   EXPECT_GT(contacts, 3000);
 }
 
+/// A stylus with a foot that lies on a plate: which of the two holds the tool at their joint
+/// depends on their order and on the way there, the torque on the pose alone.
+TEST(SurfaceTool, TheTorqueAtAJointIsThatOfThePose) {
+  const ToolSegment stylus{Vec3(0), Vec3(0, 0, 0.08)}, foot{Vec3(0), Vec3(0.03, 0, 0)},
+      back{Vec3(0.03, 0, 0), Vec3(0)};
+  const stimuli::PolygonSoup plate = stimuli::box(Vec3(0.1, 0.1, 0.02));
+  for (const bool by_surface : {true, false}) {
+    for (const double tilt : {-0.012, -0.005, 0.0, 0.004, 0.01, 0.02}) {
+      std::vector<Vec3> torques;
+      for (const auto& segments : {std::vector{stylus, foot}, std::vector{foot, stylus},
+                                   std::vector{stylus, back}, std::vector{back, stylus}}) {
+        Tool tool;
+        tool.segments = segments;
+        const Scene scene = by_surface ? scene_of({plate}, tool)
+                                       : Scene(object_of({plate}, Pose{}, kStiffness), true, tool);
+        RenderState state = scene.initial_state();
+        const Vec3 along(std::sin(tilt), 0, std::cos(tilt));
+        Rendering r;
+        for (int i = 0; i < 40; ++i) {
+          const Vec3 tip(-0.02, 0.003, 0.012 - 1e-4 * i);
+          state.measured_side = {std::cos(tilt), 0, -std::sin(tilt)};
+          r = ray_renderer().tick(scene, state, {tip, tip + 0.12 * along}, kTick);
+        }
+        torques.push_back(r.torque);
+        EXPECT_LT(glm::distance(r.torque, torques.front()), 1e-12) << tilt << ' ' << by_surface;
+      }
+      EXPECT_GT(glm::length(torques.front()), 1e-3);  // of the foot
+    }
+  }
+}
+
 /// A part out of reach makes the tick a general one.
 TEST_P(SurfaceContact, ASurfaceAloneGivesTheBitsOfAnyScene) {
   constexpr std::uint64_t kSeed = 23;
