@@ -340,6 +340,11 @@ class Bench(CommandCase):
             concave = {(r["triangles"], r["state"]) for r in rows if r["mesh"] == "bumpy ball, concave" and r["renderer"] == renderer}
             # The mesh of a million triangles is for 20,000 ticks and more.
             self.assertEqual(concave, {(n, state) for n in (1280, 81920) for state in ("contact", "free", "first_contact")})
+        scenes = [(r["mesh"], r["triangles"], r["renderer"], r["state"], r["tool_segments"], r["near_parts"]) for r in rows]
+        for r, scene in zip(rows, scenes):
+            if r["caches"] == "cold":
+                self.assertEqual(scenes.count(scene), 2, "one row warm, one cold")
+        self.assertEqual(sum(r["caches"] == "cold" for r in rows), 2 * 3 * 10)
         for r in rows:
             self.assertGreaterEqual(r["ticks"], 50, r)
             self.assertEqual(r["allocations"], 0, r)
