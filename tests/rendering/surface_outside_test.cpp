@@ -198,10 +198,12 @@ PolygonSoup folded_plate(Random& random) {
   const double thick = uniform(random, 5e-4, 2e-3), cell = 0.004;
   std::vector<Vec3> moved;
   for (int i = 0; i < (kCells + 1) * (kCells + 1); ++i) {
-    const double kind = random.unit();
+    // Not beside each other: together they would be deep.
+    const bool single = i % (kCells + 1) % 2 == 0 && i / (kCells + 1) % 2 == 0;
+    const double kind = single ? random.unit() : 0.5;
     Vec3 by(0, 0, uniform(random, 0, 1e-4));
-    if (kind < 0.1) by.z = -thick - uniform(random, 1e-6, kPocket);
-    if (kind > 0.9) by.x = uniform(random, 1, 1.005) * cell;
+    if (kind < 0.25) by.z = -thick - uniform(random, 1e-6, kPocket);
+    if (kind > 0.75) by.x = uniform(random, 1, 1.005) * cell;
     moved.push_back(by);
   }
   return lattice(
