@@ -271,6 +271,17 @@ void escape(std::string_view token, std::string& out) {
   }
 }
 
+/// A SHA-256 as 64 digits 0-9 and a-f. False and a fault otherwise.
+bool read_checksum(const json& value, const std::string& pointer, std::string& out,
+                   FaultList& faults) {
+  if (value.is_string() && is_checksum(value.get_ref<const std::string&>())) {
+    out = value.get<std::string>();
+    return true;
+  }
+  faults.add(pointer, "expected a SHA-256, 64 digits 0-9 and a-f" + found_text(value));
+  return false;
+}
+
 }  // namespace
 
 std::string found_text(const json& value) { return ", found " + json_excerpt(value); }
@@ -296,16 +307,6 @@ bool read_text(const json& value, const std::string& pointer, std::string& out, 
   }
   faults.add(pointer, "expected a text of at most " + std::to_string(most) +
                           " bytes without U+0000" + found_text(value));
-  return false;
-}
-
-bool read_checksum(const json& value, const std::string& pointer, std::string& out,
-                   FaultList& faults) {
-  if (value.is_string() && is_checksum(value.get_ref<const std::string&>())) {
-    out = value.get<std::string>();
-    return true;
-  }
-  faults.add(pointer, "expected a SHA-256, 64 digits 0-9 and a-f" + found_text(value));
   return false;
 }
 

@@ -119,10 +119,6 @@ bool read_number(const nlohmann::json& value, const std::string& pointer, double
 bool read_text(const nlohmann::json& value, const std::string& pointer, std::string& out,
                std::size_t most, FaultList& faults);
 
-/// A SHA-256 as 64 digits 0-9 and a-f. False and a fault otherwise.
-bool read_checksum(const nlohmann::json& value, const std::string& pointer, std::string& out,
-                   FaultList& faults);
-
 /// A unit quaternion [w, x, y, z]; within 1e-6 of unit length, then normalised. nullopt and a fault
 /// otherwise.
 std::optional<Quat> read_quaternion(const nlohmann::json& value, const std::string& pointer,

@@ -13,6 +13,7 @@
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "stimuli/mesh_file.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/shapes.h"
 #include "stimuli/solids/solid_mesh.h"
 

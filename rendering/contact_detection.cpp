@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 
 #include "rendering/facet_walk.h"
+#include "stimuli/convex_mesh.h"
 
 namespace palpate::rendering {
 namespace {

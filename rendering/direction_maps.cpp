@@ -7,6 +7,7 @@
 
 #include "rendering/facet_walk.h"
 #include "rendering/separation.h"
+#include "stimuli/convex_mesh.h"
 
 namespace palpate::rendering {
 

@@ -5,6 +5,7 @@
 #include <glm/geometric.hpp>
 
 #include "rendering/probes.h"
+#include "stimuli/convex_mesh.h"
 
 namespace palpate::rendering {
 namespace {

@@ -7,6 +7,8 @@
 #include <glm/geometric.hpp>
 #include <numeric>
 
+#include "stimuli/convex_mesh.h"
+
 namespace palpate::rendering {
 namespace {
 constexpr std::uint32_t kLeaf =

@@ -12,6 +12,7 @@
 #include "rendering/facet_walk.h"
 #include "rendering/scene.h"
 #include "rendering/separation.h"
+#include "stimuli/convex_mesh.h"
 
 namespace palpate::rendering {
 namespace {

@@ -7,6 +7,8 @@
 #include <stdexcept>
 #include <utility>
 
+#include "stimuli/convex_mesh.h"
+
 namespace palpate::rendering {
 namespace {
 

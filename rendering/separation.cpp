@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "rendering/direction_maps.h"
+#include "stimuli/convex_mesh.h"
 
 namespace palpate::rendering {
 namespace {

@@ -14,6 +14,7 @@
 #include "rendering/render_fault.h"
 #include "rendering/surface_contact.h"
 #include "rendering/union_state.h"
+#include "stimuli/convex_mesh.h"
 
 namespace palpate::rendering {
 namespace {

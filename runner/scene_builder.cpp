@@ -17,8 +17,10 @@
 #include "rendering/bodies/soft/soft_scene.h"
 #include "runner/touching_solids.h"
 #include "stimuli/closed_surface.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/inset.h"
 #include "stimuli/parts/convex_parts.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "stimuli/shapes.h"
 

@@ -16,6 +16,7 @@
 #include "rendering/tool.h"
 #include "runner/sharp_edges.h"
 #include "runner/workspace_map.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::runner {
 

@@ -6,6 +6,8 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "stimuli/convex_mesh.h"
+
 namespace palpate::runner {
 namespace {
 

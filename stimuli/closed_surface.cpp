@@ -15,6 +15,7 @@
 #include "stimuli/face_triangles.h"
 #include "stimuli/half_edges.h"
 #include "stimuli/mesh_names.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/vec.h"
 
 namespace palpate::stimuli {

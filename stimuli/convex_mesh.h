@@ -4,41 +4,12 @@
 
 #include <array>
 #include <cstdint>
-#include <memory>
-#include <stdexcept>
-#include <string>
-#include <vector>
 
 #include "stimuli/large_array.h"
-#include "stimuli/mesh_names.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/vec.h"
 
 namespace palpate::stimuli {
-
-/// The input of a mesh: vertices, and faces as index loops, counter-clockwise seen from outside.
-struct PolygonSoup {
-  std::vector<Vec3> vertices;                     ///< m
-  std::vector<std::vector<std::uint32_t>> faces;  ///< three or more corners each
-  /// m; error of each coordinate (from the digits of a text file, or single precision). 0: double
-  /// precision. Tolerances are never smaller.
-  double coordinate_error = 0;
-  /// Names of a file's groups of faces, and the group number of each face. Empty: no groups.
-  std::vector<std::string> group_names = {};
-  std::vector<std::uint32_t> group_of = {};
-  /// Names of vertices and faces in the file, for messages. nullptr: numbered from 0.
-  std::shared_ptr<const MeshNames> names = {};
-};
-
-/// Why a polygon soup is not a convex mesh: one message for each fault (the first few of each
-/// kind).
-class MeshError : public std::runtime_error {
- public:
-  explicit MeshError(std::vector<std::string> faults);
-  const std::vector<std::string>& faults() const { return faults_; }
-
- private:
-  std::vector<std::string> faults_;
-};
 
 /// One side of a facet's polygon, in counter-clockwise order seen from outside.
 struct Side {
@@ -109,35 +80,5 @@ class ConvexMesh {
   Vec3 centre_;
   double radius_ = 0;
 };
-
-// How far two neighbouring polygons are from lying in one plane. SI units.
-
-/// The extent of a polygon relative to one of its sides.
-class PolygonExtent {
- public:
-  /// `side`: from the side's first corner to its second, m.
-  explicit PolygonExtent(const Vec3& side);
-
-  /// `arm`: from the side's first corner to any corner of the polygon, m.
-  void include(const Vec3& arm);
-
-  double across() const { return across_; }      ///< m, how far it extends from the side's line
-  double overhang() const { return overhang_; }  ///< how far past the side's ends, in side lengths
-
- private:
-  Vec3 along_;
-  double length_;
-  double across_ = 0, overhang_ = 0;
-};
-
-/// The distance by which the corners of two polygons that share a side would have to be moved to
-/// lie in one plane, as a multiple of the error (m) of the corners; negative for a reflex (concave)
-/// edge. Up to kCoplanar in size they are coplanar within the error.
-/// \param side  as it runs in the polygon of `normal` and `extent`; the others belong to the
-/// polygon across
-double plane_deviation(const Vec3& normal, const Vec3& normal_across, const Vec3& side,
-                       const PolygonExtent& extent, const PolygonExtent& extent_across,
-                       double error);
-inline constexpr double kCoplanar = 4;
 
 }  // namespace palpate::stimuli

@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "stimuli/face_triangles.h"
+#include "stimuli/mesh_names.h"
+#include "stimuli/plane_deviation.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -6,7 +6,6 @@
 #include <span>
 #include <vector>
 
-#include "stimuli/convex_mesh.h"
 #include "stimuli/half_edges.h"
 #include "stimuli/mesh_names.h"
 #include "stimuli/vec.h"

@@ -9,6 +9,8 @@
 #include <numeric>
 
 #include "stimuli/closed_surface.h"
+#include "stimuli/mesh_names.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::stimuli {
 namespace {

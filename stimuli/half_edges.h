@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "stimuli/convex_mesh.h"
 #include "stimuli/mesh_names.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::stimuli {
 

@@ -9,7 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "stimuli/convex_mesh.h"
 #include "stimuli/grid_hull.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::stimuli {
 namespace {

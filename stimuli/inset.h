@@ -4,9 +4,11 @@
 #include <memory>
 #include <vector>
 
-#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::stimuli {
+
+class ConvexMesh;
 
 struct Ball {
   Vec3 centre;        ///< m

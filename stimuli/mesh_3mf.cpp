@@ -26,6 +26,8 @@
 
 #include "data/base/text.h"
 #include "stimuli/mesh_formats.h"
+#include "stimuli/mesh_names.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/vec.h"
 
 namespace palpate::stimuli {

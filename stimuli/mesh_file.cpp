@@ -12,6 +12,7 @@
 
 #include "data/base/text.h"
 #include "stimuli/mesh_formats.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::stimuli {
 

@@ -14,6 +14,8 @@
 
 #include "data/base/input_file.h"
 #include "data/base/text.h"
+#include "stimuli/mesh_names.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::stimuli {
 

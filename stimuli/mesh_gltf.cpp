@@ -19,6 +19,8 @@
 #include "data/base/json_text.h"
 #include "data/base/text.h"
 #include "stimuli/mesh_formats.h"
+#include "stimuli/mesh_names.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/vec.h"
 
 namespace palpate::stimuli {

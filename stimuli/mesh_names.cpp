@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::stimuli {
 

@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "stimuli/polygon_soup.h"
 #include "stimuli/vec.h"
 
 namespace palpate::stimuli {

@@ -13,6 +13,8 @@
 #include <vector>
 
 #include "stimuli/mesh_formats.h"
+#include "stimuli/mesh_names.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -11,9 +11,11 @@
 #include <stdexcept>
 #include <string>
 
+#include "stimuli/convex_mesh.h"
 #include "stimuli/half_edges.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/mesh_names.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -2,10 +2,12 @@
 // The four shapes of the experiment as polygon soups. Vertices lie on the analytic surface;
 // vertex k of a rim stands at the angle 2 pi k / segments from +x. SI units.
 
-#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::stimuli {
+
+class ConvexMesh;
 
 PolygonSoup icosphere(double radius, int subdivisions);        ///< 20 * 4^subdivisions triangles
 PolygonSoup cone(double radius, double height, int segments);  ///< axis +z, apex at +height/2

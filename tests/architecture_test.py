@@ -56,17 +56,21 @@ MAY_INCLUDE = {
                              "analysis/input", "analysis/report", "analysis/statistics", "runner/output", "runner/participants", "runner/safety",
                              "runner/session"},
     "runner/serve": SERVO | {"protocols", "runner/safety", "runner/session"},
-    "runner/sweep": SERVO | {"protocols", "runner/output", "runner/participants"},
+    "runner/sweep": SERVO | {"protocols", "data", "data/files", "data/store", "runner/output", "runner/participants", "runner/session"},
     "runner/output": {"stimuli", "data", "data/files", "runner"},
-    "runner/touch": SERVO | {"protocols", "data", "data/store", "analysis", "analysis/figures", "analysis/input",
-                             "analysis/report", "runner/safety", "runner/output", "runner/session", "runner/display/scene"},
+    # Who takes part, with what.
+    "runner/station": SERVO | {"protocols", "data", "data/files", "data/store", "runner/safety", "runner/devices", "runner/display",
+                               "runner/participants", "runner/session", "runner/sound"},
+    "runner/touch": SERVO | {"protocols", "data", "data/files", "data/store", "analysis", "analysis/figures", "analysis/input",
+                             "analysis/report", "runner/safety", "runner/output", "runner/session", "runner/display",
+                             "runner/display/scene", "runner/serve", "runner/station"},
     "runner/movement": SERVO | {"protocols", "data", "data/store", "data/export", "analysis/input", "analysis/movement",
-                                "runner/session"},
+                                "runner/output", "runner/session", "runner/study"},
     "runner/evidence": set(),
     "runner/evidence/verification": RENDERING,
     "runner/evidence/accuracy": BODIES | {"runner/evidence/verification", "rendering/bodies/soft"},
     "runner/evidence/stability": SERVO | {"protocols", "rendering/bodies", "runner/devices"},
-    "runner/evidence/reports": BODIES | {"runner/evidence/accuracy", "runner/evidence/verification", "analysis",
+    "runner/evidence/reports": SERVO | {"runner/evidence/accuracy", "runner/evidence/stability", "runner/evidence/verification", "analysis",
                                          "analysis/figures", "analysis/report", "analysis/statistics"},
 }
 # The commands, the Python module and main() may include everything.
@@ -99,7 +103,7 @@ def room_of(name):
 LOOKS_INSIDE = {"runner/evidence/accuracy", "runner/evidence/verification"}
 # The headers of a room that other rooms use; all others are the room's own business (and that of the rooms within).
 PUBLIC = {
-    "stimuli": "closed_surface shapes convex_mesh grid_hull inset large_array mesh_file orientation "
+    "stimuli": "closed_surface shapes convex_mesh grid_hull inset large_array mesh_file orientation polygon_soup "
                "parts/convex_parts parts/facets primitives solids/solid_mesh vec",
     "rendering": "first_contact probe reach render_fault renderer scene tool",
     "rendering/bodies": "moving_scene",
@@ -140,13 +144,14 @@ PUBLIC = {
                       "preflight run_record replay session session_end simulated_study "
                       "socket_advisor station",
     "runner/output": "outputs progress_line",
-    "runner/touch": "forces scene_notes trial_page",
-    "runner/movement": "touched_trial",
-    "runner/evidence/reports": "accuracy_report",
+    "runner/station": "admission opening protocol_choice run_settings",
+    "runner/touch": "forces live_touch scene_notes trial_page",
+    "runner/movement": "movement_study touched_trial",
+    "runner/evidence/reports": "accuracy_report stability_report stability_study",
     "runner/registration": "about_file answers bundle_contents deviations planned_conditions planned_studies registration registration_text sealed_folder",
     "runner/study": "export_settings simulation_limits study_order study_trials task_words",
     "runner/serve": "network served_scene served_session",
-    "runner/sweep": "cluster_job swept_study",
+    "runner/sweep": "cluster_folder cluster_job slurm swept_study",
     "runner/evidence/stability": "boundary",
     "runner/evidence": "tick_meters",
     "runner/commands": "shared/command shared/study_options",

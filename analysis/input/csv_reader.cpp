@@ -11,7 +11,7 @@
 namespace palpate::analysis {
 namespace {
 
-constexpr std::size_t kLongestName = 64;  // bytes; longer names are not compared
+constexpr std::size_t kLongestCompared = 64;  // bytes; longer names are not compared
 constexpr std::size_t kMostShown = 40;
 
 bool is_letter_or_digit(char c) {
@@ -46,7 +46,8 @@ std::vector<AlikeColumn> alike_columns(const std::vector<std::string>& found,
   std::vector<AlikeColumn> alike;
   for (const std::string& name : found) {
     const std::string own = plain(name);
-    if (own.empty() || name.size() > kLongestName || std::ranges::find(known, name) != known.end())
+    if (own.empty() || name.size() > kLongestCompared ||
+        std::ranges::find(known, name) != known.end())
       continue;
     std::string_view nearest;
     std::size_t least = own.size() <= 5 ? 2 : 3;  // beyond, names count as different

@@ -95,6 +95,13 @@ std::string sentence(const std::string& what, const std::string& reason) {
   return what + ": " + reason + ".";
 }
 
+/// Fixed notation with the sign, also +.
+std::string signed_fixed(double value, int decimals) {
+  if (!std::isfinite(value)) return kMissing;
+  const std::string text = fixed(value, decimals);
+  return (value > 0 && text.find_first_not_of("0.") != std::string::npos ? "+" : "") + text;
+}
+
 /// 100 (exp m - 1): percent change of time for a log ratio m.
 std::string percent_change(const std::optional<double>& log_ratio) {
   if (!log_ratio) return kMissing;
@@ -143,6 +150,89 @@ std::string limit_of(const TimeOutCell& cell) {
   return seconds(*cell.lowest_limit) + " to " + seconds(*cell.highest_limit) + " s";
 }
 
+/// An interval of log ratios as percent reductions: "3.1 to 12.0".
+std::string reduction_interval(const std::optional<Interval>& log_ratio) {
+  if (!log_ratio) return kMissing;
+  const Interval ends = percent_reduction(*log_ratio);
+  return number(ends.low, 1) + " to " + number(ends.high, 1);
+}
+
+/// Whether there is more than one comparison: then rows of tables are named by renderer and shape,
+/// not by shape.
+bool has_several_comparisons(const Analysis& analysis) { return analysis.comparisons.size() > 1; }
+
+/// An empty table for a row for each comparison and shape. \param header of the columns after the
+/// names
+Table comparison_table(const Analysis& analysis, const std::string& what,
+                       const std::vector<std::string>& header) {
+  Table table;
+  table.caption = caption(analysis, what);
+  if (has_several_comparisons(analysis)) table.header.emplace_back("renderer");
+  table.header.emplace_back("shape");
+  table.n_names = table.header.size();
+  table.header.insert(table.header.end(), header.begin(), header.end());
+  return table;
+}
+
+/// The name cells of a row of such a table.
+std::vector<std::string> row_names(const Analysis& analysis, const RendererPair& pair,
+                                   const std::string& shape) {
+  if (has_several_comparisons(analysis)) return {pair.renderer, shape};
+  return {shape};
+}
+
+/// A shape in a list: "cone", or "cone (tube)" with several comparisons.
+std::string listed_shape(const Analysis& analysis, const RendererPair& pair,
+                         const std::string& shape) {
+  return has_several_comparisons(analysis) ? shape + " (" + pair.renderer + ")" : shape;
+}
+
+/// Coverage of the BCa intervals for the numbers of pairs in the data; empty if all are 20 or more.
+std::string narrow_bootstrap_note(const Analysis& analysis) {
+  std::map<std::size_t, double> by_pairs;
+  for (const Comparison& comparison : analysis.comparisons) {
+    for (const PairedShape& shape : comparison.shapes) {
+      const auto coverage = bca_coverage(shape.n_pairs);
+      if (shape.bootstrap.log_ratio_ci95 && coverage) by_pairs[shape.n_pairs] = *coverage;
+    }
+  }
+  if (by_pairs.empty()) return {};
+  std::string text;
+  for (const auto& [pairs, coverage] : by_pairs) {
+    text += (text.empty() ? "" : ", ") + fixed(100 * coverage, 0) + " % with " +
+            std::to_string(pairs) + " pairs";
+  }
+  return "BCa intervals are too short for few participants: their coverage is not 95 % but " +
+         text +
+         " (simulated, normal differences; the t interval: 95 %). With skewed differences the "
+         "coverage of both is lower.";
+}
+
+/// 90 % intervals and Bayes factors of the paired tests of times.
+Table no_difference_table(const Analysis& analysis) {
+  Table table;
+  table.caption = caption(analysis, "Times: what speaks for no difference");
+  table.n_names = 2;
+  table.header = {"compared", "shape", "percent less time", "90 % interval", "BF10", "pairs"};
+  std::size_t fewest = kLeastForBayes;
+  for (const Comparison& comparison : analysis.comparisons) {
+    for (std::size_t s = 0; s < comparison.shapes.size(); ++s) {
+      const PairedShape& shape = comparison.shapes[s];
+      if (!shape.mean_log_ratio) continue;
+      const PairedEvidence evidence = evidence_of(*shape.mean_log_ratio, shape.t_test);
+      if (!evidence.ci90) continue;
+      const Interval ends = percent_reduction(*evidence.ci90);
+      table.rows.push_back({difference_name(comparison.pair), analysis.table.shapes[s],
+                            fixed(*shape.percent_reduction_geometric, 1),
+                            fixed(ends.low, 1) + " to " + fixed(ends.high, 1),
+                            bayes_cell(evidence.bayes_factor), std::to_string(shape.n_pairs)});
+      fewest = std::min(fewest, shape.n_pairs);
+    }
+  }
+  add_bayes_notes(fewest, table);
+  return table;
+}
+
 }  // namespace
 
 std::string number(const std::optional<double>& value, int decimals) {
@@ -158,26 +248,12 @@ std::optional<double> to_percent(const std::optional<double>& proportion) {
   return 100 * *proportion;
 }
 
-std::string signed_fixed(double value, int decimals) {
-  if (!std::isfinite(value)) return kMissing;
-  const std::string text = fixed(value, decimals);
-  return (value > 0 && text.find_first_not_of("0.") != std::string::npos ? "+" : "") + text;
-}
-
 std::string p_or_missing(const std::optional<double>& p) { return p ? p_text(*p) : kMissing; }
-
-std::string reduction_interval(const std::optional<Interval>& log_ratio) {
-  if (!log_ratio) return kMissing;
-  const Interval ends = percent_reduction(*log_ratio);
-  return number(ends.low, 1) + " to " + number(ends.high, 1);
-}
 
 std::string caption(const Analysis& analysis, const std::string& what) {
   const std::string label = simulated_label(analysis.table.simulated);
   return label.empty() ? what : what + " (" + label + ")";
 }
-
-bool has_several_comparisons(const Analysis& analysis) { return analysis.comparisons.size() > 1; }
 
 std::string test_text(const TTest& test) {
   return "t(" + number(test.df, 0) + ") = " + number(test.t, 2) + ", " + p_phrase(*test.p);
@@ -231,48 +307,6 @@ std::size_t number_of_tests(const std::vector<Comparison>& comparisons) {
 }
 
 const char* holm_heading(std::size_t tests) { return tests == 1 ? "p" : "p (Holm)"; }
-
-Table comparison_table(const Analysis& analysis, const std::string& what,
-                       const std::vector<std::string>& header) {
-  Table table;
-  table.caption = caption(analysis, what);
-  if (has_several_comparisons(analysis)) table.header.emplace_back("renderer");
-  table.header.emplace_back("shape");
-  table.n_names = table.header.size();
-  table.header.insert(table.header.end(), header.begin(), header.end());
-  return table;
-}
-
-std::vector<std::string> row_names(const Analysis& analysis, const RendererPair& pair,
-                                   const std::string& shape) {
-  if (has_several_comparisons(analysis)) return {pair.renderer, shape};
-  return {shape};
-}
-
-std::string listed_shape(const Analysis& analysis, const RendererPair& pair,
-                         const std::string& shape) {
-  return has_several_comparisons(analysis) ? shape + " (" + pair.renderer + ")" : shape;
-}
-
-std::string narrow_bootstrap_note(const Analysis& analysis) {
-  std::map<std::size_t, double> by_pairs;
-  for (const Comparison& comparison : analysis.comparisons) {
-    for (const PairedShape& shape : comparison.shapes) {
-      const auto coverage = bca_coverage(shape.n_pairs);
-      if (shape.bootstrap.log_ratio_ci95 && coverage) by_pairs[shape.n_pairs] = *coverage;
-    }
-  }
-  if (by_pairs.empty()) return {};
-  std::string text;
-  for (const auto& [pairs, coverage] : by_pairs) {
-    text += (text.empty() ? "" : ", ") + fixed(100 * coverage, 0) + " % with " +
-            std::to_string(pairs) + " pairs";
-  }
-  return "BCa intervals are too short for few participants: their coverage is not 95 % but " +
-         text +
-         " (simulated, normal differences; the t interval: 95 %). With skewed differences the "
-         "coverage of both is lower.";
-}
 
 void Reasons::add(const std::string& reason, const std::string& shape) {
   if (reason.empty()) return;
@@ -388,30 +422,6 @@ Table accuracy_difference_table(const Analysis& analysis) {
   std::size_t fewest = kLeastForBayes;
   for (const Comparison& comparison : analysis.comparisons)
     fewest = std::min(fewest, comparison.accuracy.all.n);
-  add_bayes_notes(fewest, table);
-  return table;
-}
-
-Table no_difference_table(const Analysis& analysis) {
-  Table table;
-  table.caption = caption(analysis, "Times: what speaks for no difference");
-  table.n_names = 2;
-  table.header = {"compared", "shape", "percent less time", "90 % interval", "BF10", "pairs"};
-  std::size_t fewest = kLeastForBayes;
-  for (const Comparison& comparison : analysis.comparisons) {
-    for (std::size_t s = 0; s < comparison.shapes.size(); ++s) {
-      const PairedShape& shape = comparison.shapes[s];
-      if (!shape.mean_log_ratio) continue;
-      const PairedEvidence evidence = evidence_of(*shape.mean_log_ratio, shape.t_test);
-      if (!evidence.ci90) continue;
-      const Interval ends = percent_reduction(*evidence.ci90);
-      table.rows.push_back({difference_name(comparison.pair), analysis.table.shapes[s],
-                            fixed(*shape.percent_reduction_geometric, 1),
-                            fixed(ends.low, 1) + " to " + fixed(ends.high, 1),
-                            bayes_cell(evidence.bayes_factor), std::to_string(shape.n_pairs)});
-      fewest = std::min(fewest, shape.n_pairs);
-    }
-  }
   add_bayes_notes(fewest, table);
   return table;
 }

@@ -37,8 +37,6 @@ Table times_table(const Analysis& analysis);
 Table accuracy_table(const Analysis& analysis);
 /// Difference of accuracy, per comparison, of all and of answered trials: shares and model.
 Table accuracy_difference_table(const Analysis& analysis);
-/// 90 % intervals and Bayes factors of the paired tests of times.
-Table no_difference_table(const Analysis& analysis);
 /// Change of time and of accuracy, per comparison and shape: speed-accuracy trade-off.
 Table speed_accuracy_table(const Analysis& analysis);
 /// Confusion matrix of each renderer.
@@ -73,18 +71,11 @@ std::string number(const std::optional<double>& value, int decimals);
 std::string percent(const std::optional<double>& value, int decimals = 1);
 /// 100 times a proportion.
 std::optional<double> to_percent(const std::optional<double>& proportion);
-/// Fixed notation with the sign, also +.
-std::string signed_fixed(double value, int decimals);
 std::string p_or_missing(const std::optional<double>& p);
-/// An interval of log ratios as percent reductions: "3.1 to 12.0".
-std::string reduction_interval(const std::optional<Interval>& log_ratio);
 
 /// "Response times" or "Response times (SIMULATED PARTICIPANTS)".
 std::string caption(const Analysis& analysis, const std::string& what);
 
-/// Whether there is more than one comparison: then rows of tables are named by renderer and shape,
-/// not by shape.
-bool has_several_comparisons(const Analysis& analysis);
 /// "t(6) = 2.10, p = 0.080". \pre the test is defined
 std::string test_text(const TTest& test);
 /// "t(6) = 2.10, p = 0.080, dz = 0.79, n = 7", with p adjusted over several tests. \pre as above
@@ -97,20 +88,6 @@ std::vector<std::string> sentences_to_quote(const Analysis& analysis);
 std::size_t number_of_tests(const std::vector<Comparison>& comparisons);
 /// Heading of the column of p values adjusted over so many tests: of one test it is p itself.
 const char* holm_heading(std::size_t tests);
-
-/// An empty table for a row for each comparison and shape. \param header of the columns after the
-/// names
-Table comparison_table(const Analysis& analysis, const std::string& what,
-                       const std::vector<std::string>& header);
-/// The name cells of a row of such a table.
-std::vector<std::string> row_names(const Analysis& analysis, const RendererPair& pair,
-                                   const std::string& shape);
-/// A shape in a list: "cone", or "cone (tube)" with several comparisons.
-std::string listed_shape(const Analysis& analysis, const RendererPair& pair,
-                         const std::string& shape);
-
-/// Coverage of the BCa intervals for the numbers of pairs in the data; empty if all are 20 or more.
-std::string narrow_bootstrap_note(const Analysis& analysis);
 
 /// Collects why values are undefined; one note for each reason, with its shapes.
 class Reasons {

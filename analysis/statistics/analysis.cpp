@@ -462,8 +462,7 @@ void warn_of_practice(Analysis& analysis) {
   }
 }
 
-}  // namespace
-
+/// \param too_fast s, as in describe()
 Practice practice_effects(const TrialTable& table, const Description& description,
                           double too_fast) {
   Practice out;
@@ -477,6 +476,8 @@ Practice practice_effects(const TrialTable& table, const Description& descriptio
   adjust(out);
   return out;
 }
+
+}  // namespace
 
 double Exclusions::proportion_excluded() const {
   if (n_trials == 0) return 0;

@@ -84,9 +84,6 @@ struct Practice {
       0;  ///< tests (slopes and orders) with a p: one family for Holm's adjustment
 };
 
-/// \param too_fast s, as in describe()
-Practice practice_effects(const TrialTable& table, const Description& description, double too_fast);
-
 /// Choices of the user.
 struct AnalysisSettings {
   double too_fast =

@@ -32,8 +32,9 @@ void update_inverse(MatrixXd& inverse, const VectorXd& step, const VectorXd& cha
              (product * step.transpose() + step * product.transpose()) / curvature;
 }
 
-}  // namespace
-
+/// A local minimum within bounds: Broyden, Fletcher, Goldfarb & Shanno's method with steps
+/// projected on the bounds. A place where a bound is met and the gradient is zero is a minimum:
+/// start off the bounds.
 Minimum minimize_within(const Objective& objective, const VectorXd& start, const Bounds& bounds) {
   Minimum now{bounds.clamped(start), 0};
   const Index n = start.size();
@@ -83,6 +84,8 @@ Minimum minimize_within(const Objective& objective, const VectorXd& start, const
   }
   return now;
 }
+
+}  // namespace
 
 Minimum best_of(const Objective& objective, const std::vector<VectorXd>& starts,
                 const Bounds& bounds) {

@@ -21,12 +21,6 @@ struct Bounds {
   Eigen::VectorXd clamped(const Eigen::VectorXd& x) const { return x.cwiseMax(low).cwiseMin(high); }
 };
 
-/// A local minimum within bounds: Broyden, Fletcher, Goldfarb & Shanno's method with steps
-/// projected on the bounds. A place where a bound is met and the gradient is zero is a minimum:
-/// start off the bounds.
-Minimum minimize_within(const Objective& objective, const Eigen::VectorXd& start,
-                        const Bounds& bounds);
-
 /// The least of the minima from several starts.
 Minimum best_of(const Objective& objective, const std::vector<Eigen::VectorXd>& starts,
                 const Bounds& bounds);

@@ -347,6 +347,23 @@ struct PosteriorGrid {
   PosteriorAxis threshold, log_slope, guess, lapse;
 };
 
+/// Natural logarithm. \param threshold on the scale
+double psychometric_log_likelihood(const PlacedData& data,
+                                   const protocols::PsychometricFunction& function,
+                                   double threshold, double slope, double guess, double lapse) {
+  constexpr double kLeast = 1e-15;
+  double sum = 0;
+  for (const PlacedCount& count : data.counts) {
+    const double above = count.place - threshold;
+    const double distance = function.easier == protocols::Easier::higher ? above : -above;
+    const double share = protocols::psychometric_share(function, distance, slope);
+    const double p = std::clamp(guess + (1 - guess - lapse) * share, kLeast, 1 - kLeast);
+    if (count.successes > 0) sum += count.successes * std::log(p);
+    if (count.successes < count.trials) sum += (count.trials - count.successes) * std::log1p(-p);
+  }
+  return sum;
+}
+
 void add_marginals(PosteriorGrid& grid, const PlacedData& data, const PsychometricModel& model) {
   std::vector<double> logs;
   double largest = -1e300;
@@ -428,22 +445,6 @@ PlacedData place_counts(const std::vector<LevelCount>& counts,
   // Ignore differences of levels by rounding alone.
   data.spacing = std::max(data.spacing, 1e-3 * (data.high - data.low));
   return data;
-}
-
-double psychometric_log_likelihood(const PlacedData& data,
-                                   const protocols::PsychometricFunction& function,
-                                   double threshold, double slope, double guess, double lapse) {
-  constexpr double kLeast = 1e-15;
-  double sum = 0;
-  for (const PlacedCount& count : data.counts) {
-    const double above = count.place - threshold;
-    const double distance = function.easier == protocols::Easier::higher ? above : -above;
-    const double share = protocols::psychometric_share(function, distance, slope);
-    const double p = std::clamp(guess + (1 - guess - lapse) * share, kLeast, 1 - kLeast);
-    if (count.successes > 0) sum += count.successes * std::log(p);
-    if (count.successes < count.trials) sum += (count.trials - count.successes) * std::log1p(-p);
-  }
-  return sum;
 }
 
 PsychometricObjective::Point PsychometricObjective::point(const std::vector<double>& x) const {

@@ -120,11 +120,6 @@ struct PlacedData {
 PlacedData place_counts(const std::vector<LevelCount>& counts,
                         const protocols::PsychometricFunction& function);
 
-/// Natural logarithm. \param threshold on the scale
-double psychometric_log_likelihood(const PlacedData& data,
-                                   const protocols::PsychometricFunction& function,
-                                   double threshold, double slope, double guess, double lapse);
-
 // Objective of the fit of a psychometric function, and its search.
 
 /// Search for a minimum: a grid; local searches start from its best points.

@@ -117,115 +117,6 @@ double rounding(const RemlOptimum& at) {
       1e-6, 1e-13 * std::max(1.0, std::fabs(at.point.deviance)) * (1 + at.theta.squaredNorm()));
 }
 
-/// Descends from theta until the gradient vanishes. The criterion is even in a diagonal theta, so a
-/// starting value on the boundary stays there.
-RemlOptimum descend(const RemlStatistics& data, const MatrixXd& coding, VectorXd theta) {
-  RemlOptimum out;
-  out.theta = std::move(theta);
-  out.point = reml_point(data, coding, out.theta, true);
-  for (int i = 0; i < kMaxSteps; ++i) {
-    const VectorXd step = newton_step(out.point);
-    const double promised = -step.dot(out.point.gradient);
-    const double noise = rounding(out);
-    const double longest = 1 + out.theta.norm();
-    double length = std::min(1.0, longest / step.norm());
-    RemlPoint next;
-    bool lower = false;
-    for (int halved = 0; halved < 40 && !lower; ++halved, length /= 2) {
-      next = reml_point(data, coding, out.theta + length * step, true);
-      lower = next.deviance <= out.point.deviance - 1e-4 * length * promised + noise;
-      if (lower) out.theta += length * step;
-    }
-    if (!lower) break;
-    // Near the minimum the deviance is constant up to rounding: a step is accepted if it reduces
-    // the gradient.
-    const bool done = promised < noise && next.gradient.norm() >= 0.5 * out.point.gradient.norm();
-    out.point = std::move(next);
-    if (promised < noise) out.converged = true;
-    if (done || promised == 0) break;
-  }
-  return out;
-}
-
-/// Among the directions in which Psi is 0, that of steepest descent; none: the Karush-Kuhn-Tucker
-/// conditions hold.
-VectorXd way_off_boundary(const RemlOptimum& at, const MatrixXd& coding, Index q) {
-  const MatrixXd lambda = lower_triangle(at.theta, q);
-  const MatrixXd slope = coding.transpose() * at.point.slope * coding;  // by Lambda Lambda'
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> psi(lambda * lambda.transpose());
-  std::vector<Index> null;
-  for (Index i = 0; i < q; ++i) {
-    if (psi.eigenvalues()(i) <= kOnBoundary * kOnBoundary) null.push_back(i);
-  }
-  if (null.empty()) return VectorXd::Zero(q);
-  const MatrixXd basis = psi.eigenvectors()(Eigen::all, null);
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> reduced(basis.transpose() * slope * basis);
-  const double scale = 1e-9 * std::max(1.0, slope.norm());
-  if (reduced.eigenvalues()(0) >= -scale) return VectorXd::Zero(q);
-  return basis * reduced.eigenvectors().col(0);
-}
-
-VectorXd with_small_diagonals_at_zero(VectorXd theta, Index q) {
-  for (const Index k : diagonal(q)) {
-    if (std::fabs(theta(k)) < kOnBoundary) theta(k) = 0;
-  }
-  return theta;
-}
-
-/// descend(), then leaves the boundary if that lowers the deviance, and sets parameters near 0 to
-/// exactly 0.
-RemlOptimum optimum_from(const RemlStatistics& data, const MatrixXd& coding,
-                         const VectorXd& start) {
-  const Index q = data.levels;
-  RemlOptimum best = descend(data, coding, start);
-  for (int i = 0; i < 10; ++i) {
-    best.theta = theta_of(lower_triangle(best.theta, q));
-    const VectorXd snapped = with_small_diagonals_at_zero(best.theta, q);
-    if (snapped != best.theta || !best.converged) {
-      RemlOptimum on = descend(data, coding, snapped);
-      if (on.point.deviance <= best.point.deviance + 1e-8) best = std::move(on);
-    }
-    const VectorXd away = way_off_boundary(best, coding, q);
-    if (away.isZero(0)) break;
-    MatrixXd root(q, q + 1);
-    root << lower_triangle(best.theta, q), 0.1 * away;
-    RemlOptimum off = descend(data, coding, theta_of(root));
-    if (off.point.deviance >= best.point.deviance) break;
-    best = std::move(off);
-  }
-  // theta_of() again: a step may have changed the sign of a diagonal.
-  best.theta = theta_of(lower_triangle(best.theta, q));
-  for (const Index k : diagonal(q)) best.theta(k) = std::fabs(best.theta(k));
-  best.point = reml_point(data, coding, best.theta, true);
-  best.converged = best.converged && way_off_boundary(best, coding, q).isZero(0);
-  return best;
-}
-
-/// Moment estimate of Psi: covariance of participants' means minus the part of residual variance.
-MatrixXd by_moments(const RemlStatistics& data) {
-  const Index q = data.levels;
-  const RemlPoint flat =
-      reml_point(data, MatrixXd::Identity(q, q), VectorXd::Zero(q * (q + 1) / 2), false);
-  const double within = std::max(1e-300, (data.yy - 2 * flat.beta.dot(data.xy) +
-                                          flat.beta.dot(data.within.cwiseProduct(flat.beta))) /
-                                             std::max(1.0, data.degrees_of_freedom));
-  MatrixXd products = MatrixXd::Zero(q, q), pairs = products, noise = products;
-  for (const RemlParticipant& group : data.groups) {
-    const VectorXd rest = group.y - group.x * flat.beta;
-    products(group.levels, group.levels) += rest * rest.transpose();
-    pairs(group.levels, group.levels).array() += 1;
-    for (Index i = 0; i < group.counts.size(); ++i) {
-      const Index level = group.levels[static_cast<std::size_t>(i)];
-      noise(level, level) += 1 / group.counts(i);
-    }
-  }
-  const MatrixXd raw = (products / within - noise).cwiseQuotient(pairs.cwiseMax(1));
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(raw);
-  const double floor = 1e-3 * std::max(eigen.eigenvalues().maxCoeff(), 1e-2);
-  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(floor).asDiagonal() *
-         eigen.eigenvectors().transpose();
-}
-
 /// Matrices of a participant at a given Psi.
 struct Part {
   MatrixXd k;  // (counts^-1 + Psi)^-1 = Z'V^-1 Z
@@ -343,6 +234,164 @@ void put_derivatives(const RemlStatistics& data, const MatrixXd& coding, const V
   }
   out.full_hessian(m, m) = 4 * degrees_of_freedom / out.sigma_squared;
   for (Sums& sum : sums) out.information_loss.push_back(std::move(sum.loss));
+}
+
+/// Evaluates the criterion. \param theta lower triangle of Lambda by columns; Psi = coding Lambda
+/// Lambda' coding'. With the treatment coding of the levels theta is that of lme4 (Bates et al.
+/// 2015).
+RemlPoint reml_point(const RemlStatistics& data, const MatrixXd& coding, const VectorXd& theta,
+                     bool with_derivatives) {
+  const MatrixXd half = coding * lower_triangle(theta, data.levels);
+  const MatrixXd psi = half * half.transpose();
+  const Index p = data.within.size();
+  const double degrees_of_freedom = data.degrees_of_freedom;
+
+  RemlPoint out;
+  std::vector<Part> parts(data.groups.size());
+  MatrixXd xx = data.within.asDiagonal();
+  VectorXd xy = data.xy;
+  double log_determinant = 0;
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const RemlParticipant& group = data.groups[i];
+    // counts^-1 + Psi = D^-1/2 (1 + D^1/2 Psi D^1/2) D^-1/2 is well conditioned for any Psi, also
+    // 0.
+    const VectorXd root = group.counts.cwiseSqrt();
+    MatrixXd inner = root.asDiagonal() * rows_and_columns(psi, group.levels) * root.asDiagonal();
+    inner.diagonal().array() += 1;
+    const Eigen::LLT<MatrixXd> factor(inner);
+    log_determinant += 2 * factor.matrixLLT().diagonal().array().log().sum();
+    const MatrixXd whitened = factor.matrixL().solve(MatrixXd(root.asDiagonal()));
+    parts[i].k = whitened.transpose() * whitened;
+    parts[i].f = parts[i].k * group.x;
+    xx.noalias() += group.x.transpose() * parts[i].f;
+    xy.noalias() += parts[i].f.transpose() * group.y;
+  }
+  const Eigen::LLT<MatrixXd> factor(xx);
+  out.beta = factor.solve(xy);
+  double y_p_y =
+      data.yy - 2 * out.beta.dot(data.xy) + out.beta.dot(data.within.cwiseProduct(out.beta));
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const VectorXd rest = data.groups[i].y - data.groups[i].x * out.beta;
+    parts[i].u = parts[i].k * rest;
+    y_p_y += rest.dot(parts[i].u);
+  }
+  out.sigma_squared = y_p_y / degrees_of_freedom;
+  out.deviance = log_determinant + 2 * factor.matrixLLT().diagonal().array().log().sum() +
+                 degrees_of_freedom * (1 + std::log(2 * std::numbers::pi * out.sigma_squared));
+  if (with_derivatives) {
+    out.inverse_xx = factor.solve(MatrixXd::Identity(p, p));
+    put_derivatives(data, coding, theta, parts, y_p_y, out);
+  }
+  return out;
+}
+
+/// Descends from theta until the gradient vanishes. The criterion is even in a diagonal theta, so a
+/// starting value on the boundary stays there.
+RemlOptimum descend(const RemlStatistics& data, const MatrixXd& coding, VectorXd theta) {
+  RemlOptimum out;
+  out.theta = std::move(theta);
+  out.point = reml_point(data, coding, out.theta, true);
+  for (int i = 0; i < kMaxSteps; ++i) {
+    const VectorXd step = newton_step(out.point);
+    const double promised = -step.dot(out.point.gradient);
+    const double noise = rounding(out);
+    const double longest = 1 + out.theta.norm();
+    double length = std::min(1.0, longest / step.norm());
+    RemlPoint next;
+    bool lower = false;
+    for (int halved = 0; halved < 40 && !lower; ++halved, length /= 2) {
+      next = reml_point(data, coding, out.theta + length * step, true);
+      lower = next.deviance <= out.point.deviance - 1e-4 * length * promised + noise;
+      if (lower) out.theta += length * step;
+    }
+    if (!lower) break;
+    // Near the minimum the deviance is constant up to rounding: a step is accepted if it reduces
+    // the gradient.
+    const bool done = promised < noise && next.gradient.norm() >= 0.5 * out.point.gradient.norm();
+    out.point = std::move(next);
+    if (promised < noise) out.converged = true;
+    if (done || promised == 0) break;
+  }
+  return out;
+}
+
+/// Among the directions in which Psi is 0, that of steepest descent; none: the Karush-Kuhn-Tucker
+/// conditions hold.
+VectorXd way_off_boundary(const RemlOptimum& at, const MatrixXd& coding, Index q) {
+  const MatrixXd lambda = lower_triangle(at.theta, q);
+  const MatrixXd slope = coding.transpose() * at.point.slope * coding;  // by Lambda Lambda'
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> psi(lambda * lambda.transpose());
+  std::vector<Index> null;
+  for (Index i = 0; i < q; ++i) {
+    if (psi.eigenvalues()(i) <= kOnBoundary * kOnBoundary) null.push_back(i);
+  }
+  if (null.empty()) return VectorXd::Zero(q);
+  const MatrixXd basis = psi.eigenvectors()(Eigen::all, null);
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> reduced(basis.transpose() * slope * basis);
+  const double scale = 1e-9 * std::max(1.0, slope.norm());
+  if (reduced.eigenvalues()(0) >= -scale) return VectorXd::Zero(q);
+  return basis * reduced.eigenvectors().col(0);
+}
+
+VectorXd with_small_diagonals_at_zero(VectorXd theta, Index q) {
+  for (const Index k : diagonal(q)) {
+    if (std::fabs(theta(k)) < kOnBoundary) theta(k) = 0;
+  }
+  return theta;
+}
+
+/// descend(), then leaves the boundary if that lowers the deviance, and sets parameters near 0 to
+/// exactly 0.
+RemlOptimum optimum_from(const RemlStatistics& data, const MatrixXd& coding,
+                         const VectorXd& start) {
+  const Index q = data.levels;
+  RemlOptimum best = descend(data, coding, start);
+  for (int i = 0; i < 10; ++i) {
+    best.theta = theta_of(lower_triangle(best.theta, q));
+    const VectorXd snapped = with_small_diagonals_at_zero(best.theta, q);
+    if (snapped != best.theta || !best.converged) {
+      RemlOptimum on = descend(data, coding, snapped);
+      if (on.point.deviance <= best.point.deviance + 1e-8) best = std::move(on);
+    }
+    const VectorXd away = way_off_boundary(best, coding, q);
+    if (away.isZero(0)) break;
+    MatrixXd root(q, q + 1);
+    root << lower_triangle(best.theta, q), 0.1 * away;
+    RemlOptimum off = descend(data, coding, theta_of(root));
+    if (off.point.deviance >= best.point.deviance) break;
+    best = std::move(off);
+  }
+  // theta_of() again: a step may have changed the sign of a diagonal.
+  best.theta = theta_of(lower_triangle(best.theta, q));
+  for (const Index k : diagonal(q)) best.theta(k) = std::fabs(best.theta(k));
+  best.point = reml_point(data, coding, best.theta, true);
+  best.converged = best.converged && way_off_boundary(best, coding, q).isZero(0);
+  return best;
+}
+
+/// Moment estimate of Psi: covariance of participants' means minus the part of residual variance.
+MatrixXd by_moments(const RemlStatistics& data) {
+  const Index q = data.levels;
+  const RemlPoint flat =
+      reml_point(data, MatrixXd::Identity(q, q), VectorXd::Zero(q * (q + 1) / 2), false);
+  const double within = std::max(1e-300, (data.yy - 2 * flat.beta.dot(data.xy) +
+                                          flat.beta.dot(data.within.cwiseProduct(flat.beta))) /
+                                             std::max(1.0, data.degrees_of_freedom));
+  MatrixXd products = MatrixXd::Zero(q, q), pairs = products, noise = products;
+  for (const RemlParticipant& group : data.groups) {
+    const VectorXd rest = group.y - group.x * flat.beta;
+    products(group.levels, group.levels) += rest * rest.transpose();
+    pairs(group.levels, group.levels).array() += 1;
+    for (Index i = 0; i < group.counts.size(); ++i) {
+      const Index level = group.levels[static_cast<std::size_t>(i)];
+      noise(level, level) += 1 / group.counts(i);
+    }
+  }
+  const MatrixXd raw = (products / within - noise).cwiseQuotient(pairs.cwiseMax(1));
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(raw);
+  const double floor = 1e-3 * std::max(eigen.eigenvalues().maxCoeff(), 1e-2);
+  return eigen.eigenvectors() * eigen.eigenvalues().cwiseMax(floor).asDiagonal() *
+         eigen.eigenvectors().transpose();
 }
 
 }  // namespace
@@ -534,52 +583,6 @@ MatrixXd lower_triangle(const VectorXd& theta, Index levels) {
   Index k = 0;
   for (const auto& [row, column] : lower_triangle_entries(levels)) lambda(row, column) = theta(k++);
   return lambda;
-}
-
-RemlPoint reml_point(const RemlStatistics& data, const MatrixXd& coding, const VectorXd& theta,
-                     bool with_derivatives) {
-  const MatrixXd half = coding * lower_triangle(theta, data.levels);
-  const MatrixXd psi = half * half.transpose();
-  const Index p = data.within.size();
-  const double degrees_of_freedom = data.degrees_of_freedom;
-
-  RemlPoint out;
-  std::vector<Part> parts(data.groups.size());
-  MatrixXd xx = data.within.asDiagonal();
-  VectorXd xy = data.xy;
-  double log_determinant = 0;
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    const RemlParticipant& group = data.groups[i];
-    // counts^-1 + Psi = D^-1/2 (1 + D^1/2 Psi D^1/2) D^-1/2 is well conditioned for any Psi, also
-    // 0.
-    const VectorXd root = group.counts.cwiseSqrt();
-    MatrixXd inner = root.asDiagonal() * rows_and_columns(psi, group.levels) * root.asDiagonal();
-    inner.diagonal().array() += 1;
-    const Eigen::LLT<MatrixXd> factor(inner);
-    log_determinant += 2 * factor.matrixLLT().diagonal().array().log().sum();
-    const MatrixXd whitened = factor.matrixL().solve(MatrixXd(root.asDiagonal()));
-    parts[i].k = whitened.transpose() * whitened;
-    parts[i].f = parts[i].k * group.x;
-    xx.noalias() += group.x.transpose() * parts[i].f;
-    xy.noalias() += parts[i].f.transpose() * group.y;
-  }
-  const Eigen::LLT<MatrixXd> factor(xx);
-  out.beta = factor.solve(xy);
-  double y_p_y =
-      data.yy - 2 * out.beta.dot(data.xy) + out.beta.dot(data.within.cwiseProduct(out.beta));
-  for (std::size_t i = 0; i < parts.size(); ++i) {
-    const VectorXd rest = data.groups[i].y - data.groups[i].x * out.beta;
-    parts[i].u = parts[i].k * rest;
-    y_p_y += rest.dot(parts[i].u);
-  }
-  out.sigma_squared = y_p_y / degrees_of_freedom;
-  out.deviance = log_determinant + 2 * factor.matrixLLT().diagonal().array().log().sum() +
-                 degrees_of_freedom * (1 + std::log(2 * std::numbers::pi * out.sigma_squared));
-  if (with_derivatives) {
-    out.inverse_xx = factor.solve(MatrixXd::Identity(p, p));
-    put_derivatives(data, coding, theta, parts, y_p_y, out);
-  }
-  return out;
 }
 
 }  // namespace palpate::analysis

@@ -49,12 +49,6 @@ struct RemlPoint {
   std::vector<Eigen::MatrixXd> information_loss;
 };
 
-/// Evaluates the criterion. \param theta lower triangle of Lambda by columns; Psi = coding Lambda
-/// Lambda' coding'. With the treatment coding of the levels theta is that of lme4 (Bates et al.
-/// 2015).
-RemlPoint reml_point(const RemlStatistics& data, const Eigen::MatrixXd& coding,
-                     const Eigen::VectorXd& theta, bool with_derivatives);
-
 /// Lambda from theta.
 Eigen::MatrixXd lower_triangle(const Eigen::VectorXd& theta, Eigen::Index levels);
 

@@ -289,6 +289,22 @@ LevelFigures figures_of(const PsychometricFit& fit, const PsychometricModel& mod
           found.pse_ci95, found.jnd_ci95, found.weber_fraction_ci95};
 }
 
+/// The levels that are easier in an adaptive procedure; nullopt: it is not adaptive.
+std::optional<protocols::Easier> easier_of_adaptive(const protocols::ProcedureSpec& spec) {
+  if (const auto* staircase = std::get_if<protocols::Staircase>(&spec)) return staircase->easier;
+  if (const auto* quest = std::get_if<protocols::QuestPlus>(&spec)) return quest->function.easier;
+  if (const auto* limits = std::get_if<protocols::Limits>(&spec)) return limits->easier;
+  return std::nullopt;
+}
+
+/// The procedures of a trial's block; empty: none, or the source has no protocol.
+const std::vector<protocols::ProcedureSpec>& specs_of(const StudyTrial& trial,
+                                                      const StudyTable& table) {
+  static const std::vector<protocols::ProcedureSpec> kNone;
+  const protocols::BlockProcedures* const block = block_of(trial, table);
+  return block == nullptr ? kNone : block->specs;
+}
+
 /// The levels expected to be easier in a cell; none: unknown.
 std::optional<protocols::Easier> expected_easier(const TaskCell& cell, const Trials& trials,
                                                  bool above, bool below, const Context& context) {
@@ -325,6 +341,18 @@ void set_direction(ParticipantFunction& one, const DetectionCounts& detections, 
   one.model.function.easier = expected == Easier::higher ? Easier::lower : Easier::higher;
   one.reversed = log_likelihood() > as_expected + kHalfChiSquared95;
   if (!one.reversed) one.model.function.easier = expected;
+}
+
+/// Sets fitted_level of staircases. \param fit  of the same trials
+void add_fitted_levels(std::vector<Track>& tracks, const PsychometricModel& model,
+                       const PsychometricFit& fit) {
+  const auto& [threshold, slope, guess, lapse] = fit.parameters;
+  for (Track& track : tracks) {
+    if (!track.procedure || !track.procedure->target) continue;
+    const double share = (*track.procedure->target - guess) / (1 - guess - lapse);
+    if (share > 0 && share < 1)
+      track.procedure->fitted_level = psychometric_level(model.function, fit.parameters, share);
+  }
 }
 
 ParticipantFunction function_of(const std::string& participant, const Trials& trials,
@@ -377,6 +405,14 @@ bool equal_ratios(const std::vector<LevelCount>& counts) {
     if (std::abs(step(i) - step(1)) > kRounded * step(1)) return false;
   }
   return true;
+}
+
+/// The scale of an adaptive procedure's levels; nullopt: it is not adaptive.
+std::optional<protocols::LevelScale> scale_of_adaptive(const protocols::ProcedureSpec& spec) {
+  if (const auto* staircase = std::get_if<protocols::Staircase>(&spec)) return staircase->scale;
+  if (const auto* quest = std::get_if<protocols::QuestPlus>(&spec)) return quest->function.scale;
+  if (const auto* limits = std::get_if<protocols::Limits>(&spec)) return limits->scale;
+  return std::nullopt;
 }
 
 /// Scale of the functions of a cell's trials.
@@ -686,27 +722,6 @@ const char* kind_of(const protocols::ProcedureSpec& spec) {
   return std::holds_alternative<protocols::Limits>(spec) ? "limits" : "constant";
 }
 
-std::optional<protocols::LevelScale> scale_of_adaptive(const protocols::ProcedureSpec& spec) {
-  if (const auto* staircase = std::get_if<protocols::Staircase>(&spec)) return staircase->scale;
-  if (const auto* quest = std::get_if<protocols::QuestPlus>(&spec)) return quest->function.scale;
-  if (const auto* limits = std::get_if<protocols::Limits>(&spec)) return limits->scale;
-  return std::nullopt;
-}
-
-std::optional<protocols::Easier> easier_of_adaptive(const protocols::ProcedureSpec& spec) {
-  if (const auto* staircase = std::get_if<protocols::Staircase>(&spec)) return staircase->easier;
-  if (const auto* quest = std::get_if<protocols::QuestPlus>(&spec)) return quest->function.easier;
-  if (const auto* limits = std::get_if<protocols::Limits>(&spec)) return limits->easier;
-  return std::nullopt;
-}
-
-const std::vector<protocols::ProcedureSpec>& specs_of(const StudyTrial& trial,
-                                                      const StudyTable& table) {
-  static const std::vector<protocols::ProcedureSpec> kNone;
-  const protocols::BlockProcedures* const block = block_of(trial, table);
-  return block == nullptr ? kNone : block->specs;
-}
-
 std::vector<Track> tracks_of(const std::vector<const StudyTrial*>& trials,
                              const StudyTable& table) {
   std::map<std::string, std::vector<const StudyTrial*>> named;
@@ -735,17 +750,6 @@ std::vector<Track> tracks_of(const std::vector<const StudyTrial*>& trials,
     return std::pair(a.name.size(), a.name) < std::pair(b.name.size(), b.name);  // as numbers
   });
   return tracks;
-}
-
-void add_fitted_levels(std::vector<Track>& tracks, const PsychometricModel& model,
-                       const PsychometricFit& fit) {
-  const auto& [threshold, slope, guess, lapse] = fit.parameters;
-  for (Track& track : tracks) {
-    if (!track.procedure || !track.procedure->target) continue;
-    const double share = (*track.procedure->target - guess) / (1 - guess - lapse);
-    if (share > 0 && share < 1)
-      track.procedure->fitted_level = psychometric_level(model.function, fit.parameters, share);
-  }
 }
 
 StudyAnalysis analyze_study(StudyTable table, const FunctionSettings& functions,

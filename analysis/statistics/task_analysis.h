@@ -123,15 +123,8 @@ struct TrackProcedure {
 const char* kind_of(
     const protocols::ProcedureSpec& spec);  ///< name in protocols: "staircase", ... ...
 
-/// The scale of an adaptive procedure's levels; nullopt: it is not adaptive.
-std::optional<protocols::LevelScale> scale_of_adaptive(const protocols::ProcedureSpec& spec);
-/// The levels that are easier in an adaptive procedure; nullopt: it is not adaptive.
-std::optional<protocols::Easier> easier_of_adaptive(const protocols::ProcedureSpec& spec);
 /// The procedure of a trial's block; nullptr: the source has no protocol.
 const protocols::BlockProcedures* block_of(const StudyTrial& trial, const StudyTable& table);
-/// The procedures of a trial's block; empty: none, or the source has no protocol.
-const std::vector<protocols::ProcedureSpec>& specs_of(const StudyTrial& trial,
-                                                      const StudyTable& table);
 
 /// The trials of a track in order, those without an answer left out.
 struct Track {
@@ -148,9 +141,6 @@ struct Track {
 
 /// The tracks with more than one trial among a participant's trials in a cell.
 std::vector<Track> tracks_of(const std::vector<const StudyTrial*>& trials, const StudyTable& table);
-/// Sets fitted_level of staircases. \param fit  of the same trials
-void add_fitted_levels(std::vector<Track>& tracks, const PsychometricModel& model,
-                       const PsychometricFit& fit);
 
 /// Settings of psychometric functions and their goodness of fit.
 struct FunctionSettings {

@@ -11,14 +11,14 @@ constexpr std::int64_t kLongestLoss = 600'000;  // slots: ten minutes at 1 kHz
 constexpr double kLongestTrial = 1e6;           // s
 
 /// Damaged times may differ by more than 63 bits.
-double seconds_between(std::int64_t from_ns, std::int64_t to_ns) {
+double elapsed_seconds(std::int64_t from_ns, std::int64_t to_ns) {
   return (static_cast<double>(to_ns) - static_cast<double>(from_ns)) / 1e9;
 }
 
 }  // namespace
 
 double duration_of(const TrialRecord& record) {
-  return record.response_time + seconds_between(first_onset_ns(record), record.onset_ns);
+  return record.response_time + elapsed_seconds(first_onset_ns(record), record.onset_ns);
 }
 
 /// -1: no interval is left
@@ -27,7 +27,7 @@ std::int64_t SampleSlots::begin_of_next_interval() {
   for (std::size_t i = static_cast<std::size_t>(interval_) + 1; i < all.size(); ++i) {
     if (all[i].onset_ns == 0) continue;  // never shown
     interval_ = static_cast<int>(i);
-    const double since = seconds_between(first_onset_ns(trial_.record), all[i].onset_ns);
+    const double since = elapsed_seconds(first_onset_ns(trial_.record), all[i].onset_ns);
     return static_cast<std::int64_t>(std::round(std::clamp(since, 0.0, kLongestTrial) * rate_));
   }
   return -1;

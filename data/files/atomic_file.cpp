@@ -24,7 +24,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::size_t kLetters = 6;
-constexpr std::string_view kMark = ".palpate-";
+constexpr std::string_view kDraftMark = ".palpate-";
 
 /// Removes this user's temporary entries of the folder that no process has locked.
 template <class IsTemporary>
@@ -70,7 +70,7 @@ std::string temporary_prefix(const std::string& target) {
   const fs::path path(target);
   constexpr std::size_t kMost = 200;  // bytes; a name has at most 255
   return (path.parent_path() /
-          ("." + path.filename().string().substr(0, kMost) + std::string(kMark)))
+          ("." + path.filename().string().substr(0, kMost) + std::string(kDraftMark)))
       .string();
 }
 
@@ -83,9 +83,9 @@ void remove_stale_temporaries(const std::string& target) {
 
 void remove_stale_temporaries_in(const std::string& folder) {
   remove_unlocked(folder, [](const std::string& name) {
-    const std::size_t letters = name.rfind(kMark);
+    const std::size_t letters = name.rfind(kDraftMark);
     return name.starts_with('.') && letters != std::string::npos && letters > 1 &&
-           name.size() == letters + kMark.size() + kLetters;
+           name.size() == letters + kDraftMark.size() + kLetters;
   });
 }
 

@@ -9,6 +9,9 @@
 
 namespace palpate::data {
 
+/// A writer's lock stands beside its database under the name with this end.
+inline constexpr const char* kLockEnd = ".palpate-lock";
+
 /// "-wal", "-shm", "-journal": suffixes of the files that SQLite creates beside a database
 /// (https://www.sqlite.org/tempfiles.html).
 const std::vector<std::string>& sqlite_file_suffixes();

@@ -669,6 +669,11 @@ void sync_file(const std::string& file) {
   if (!done) throw StoreError(file + ": cannot be written: " + write_fault(error));
 }
 
+/// \throws StoreRefused with every conflict, a line each.
+MergePlan plan_merge(std::deque<StationDatabase>& stations, NumberConflict clash) {
+  return Planner().plan(stations, clash);
+}
+
 }  // namespace
 
 SweepMergeResult merge_sweeps(const std::string& out, const std::vector<std::string>& inputs,
@@ -698,10 +703,6 @@ SweepMergeResult merge_sweeps(const std::string& out, const std::vector<std::str
     throw StoreRefused(out + ": another program has created it meanwhile; nothing was written");
   }
   return done;
-}
-
-MergePlan plan_merge(std::deque<StationDatabase>& stations, NumberConflict clash) {
-  return Planner().plan(stations, clash);
 }
 
 MergeResult merge(const std::string& out, const std::vector<std::string>& inputs,

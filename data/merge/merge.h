@@ -105,7 +105,4 @@ struct MergePlan {
   std::int64_t sessions = 0;
 };
 
-/// \throws StoreRefused with every conflict, a line each.
-MergePlan plan_merge(std::deque<StationDatabase>& stations, NumberConflict clash);
-
 }  // namespace palpate::data

@@ -20,6 +20,7 @@
 #include <system_error>
 
 #include "data/errors.h"
+#include "data/files/output_check.h"
 
 namespace palpate::data {
 namespace {
@@ -57,8 +58,7 @@ int cause_of(const std::string& path, const SQLite::Exception& error) {
   return limited || (may_be_full && disk_is_full(path)) ? SQLITE_FULL : code;
 }
 
-constexpr const char* kLockEnd = ".palpate-lock";
-constexpr std::string_view kMark = "palpate ";  // and the process's number
+constexpr std::string_view kOwnerMark = "palpate ";  // and the process's number
 
 [[noreturn]] void refuse_foreign_lock(const std::string& file, const std::string& path,
                                       const std::string& why) {
@@ -98,7 +98,7 @@ int open_old_lock(const std::string& file, const std::string& path) {
   }
   const std::string text = text_of(descriptor);
   if (::fstat(descriptor, &found) == 0) require_our_lock(found, file, path);
-  if (!text.empty() && !text.starts_with(kMark)) {
+  if (!text.empty() && !text.starts_with(kOwnerMark)) {
     ::close(descriptor);
     refuse_foreign_lock(file, path, "palpate did not write it");
   }
@@ -123,7 +123,8 @@ int open_lock_file(const std::string& file, const std::string& path) {
 std::string holder(int descriptor) {
   const std::string text = text_of(descriptor);
   std::string pid;
-  for (std::size_t i = kMark.size(); i < text.size() && text[i] >= '0' && text[i] <= '9'; ++i) {
+  for (std::size_t i = kOwnerMark.size(); i < text.size() && text[i] >= '0' && text[i] <= '9';
+       ++i) {
     pid += text[i];
   }
   return pid.empty() ? "another program" : "process " + pid;
@@ -261,7 +262,7 @@ WriterLock::WriterLock(const std::string& path) : path_(path), file_(path + kLoc
     if (is_same_file(descriptor_, file_)) break;
     ::close(descriptor_);
   }
-  const std::string text = std::string(kMark) + std::to_string(::getpid()) + "\n";
+  const std::string text = std::string(kOwnerMark) + std::to_string(::getpid()) + "\n";
   // The process id is for messages only: the lock holds even if a full disk leaves the file empty.
   if (::ftruncate(descriptor_, 0) == 0 && ::pwrite(descriptor_, text.data(), text.size(), 0) < 0) {
     errno = 0;

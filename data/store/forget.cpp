@@ -354,6 +354,30 @@ std::int64_t notes_that_mention(SQLite::Database& db, const std::string& code) {
   return found;
 }
 
+/// Files that hold or may hold `code`, beside the database, beside its exports and in folders
+/// there:
+///
+/// * other palpate databases, whatever their names, with their logs;
+/// * texts (tables, reports, figures) with the code in their name or content;
+/// * files named after the database that cannot be searched (compressed, not readable, above
+///   256 MiB).
+///
+/// A folder with the code in the name of a file in it, as in a dataset, is named as a whole. Leaves
+/// out the database and its -wal, -shm, -journal, and `known`. Follows no links. Stops after
+/// 100,000 entries or 8 GiB and names the folder that it had reached.
+std::vector<std::string> find_remaining_copies(const std::string& database, const std::string& code,
+                                               const std::vector<std::string>& known) {
+  std::set<fs::path> folders{fs::path(database).parent_path()};
+  std::set<fs::path> leave_out(known.begin(), known.end());
+  for (const char* end : {"", "-wal", "-shm", "-journal", ".palpate-lock"}) {
+    leave_out.insert(database + end);
+  }
+  for (const std::string& path : known) folders.insert(fs::path(path).parent_path());
+  Search search(code, database, std::move(leave_out));
+  for (const fs::path& folder : folders) search.beside(folder);
+  return search.found();
+}
+
 }  // namespace
 
 Tombstones Tombstones::read(SQLite::Database& db, const std::string& path) {
@@ -443,19 +467,6 @@ bool mentions(const std::string& text, const std::string& code) {
     if (begins && (end == text.size() || !is_participant_code(text.substr(end, 1)))) return true;
   }
   return false;
-}
-
-std::vector<std::string> find_remaining_copies(const std::string& database, const std::string& code,
-                                               const std::vector<std::string>& known) {
-  std::set<fs::path> folders{fs::path(database).parent_path()};
-  std::set<fs::path> leave_out(known.begin(), known.end());
-  for (const char* end : {"", "-wal", "-shm", "-journal", ".palpate-lock"}) {
-    leave_out.insert(database + end);
-  }
-  for (const std::string& path : known) folders.insert(fs::path(path).parent_path());
-  Search search(code, database, std::move(leave_out));
-  for (const fs::path& folder : folders) search.beside(folder);
-  return search.found();
 }
 
 // Withdrawal: removes every byte of a participant from the database, its -wal and its backups, and

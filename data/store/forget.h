@@ -49,20 +49,6 @@ class Tombstones {
 
 // Internal to data/store: copies of a participant's data that a withdrawal does not remove.
 
-/// Files that hold or may hold `code`, beside the database, beside its exports and in folders
-/// there:
-///
-/// * other palpate databases, whatever their names, with their logs;
-/// * texts (tables, reports, figures) with the code in their name or content;
-/// * files named after the database that cannot be searched (compressed, not readable, above
-///   256 MiB).
-///
-/// A folder with the code in the name of a file in it, as in a dataset, is named as a whole. Leaves
-/// out the database and its -wal, -shm, -journal, and `known`. Follows no links. Stops after
-/// 100,000 entries or 8 GiB and names the folder that it had reached.
-std::vector<std::string> find_remaining_copies(const std::string& database, const std::string& code,
-                                               const std::vector<std::string>& known);
-
 /// Whether `text` contains `code` as a separate word.
 bool mentions(const std::string& text, const std::string& code);
 

@@ -72,6 +72,14 @@ double guesses_of(const TaskBlock& block, const TypicalSettings& settings, bool 
   return both_sides ? settings.lapse : 1.0 / block.intervals;
 }
 
+/// constant stimuli: linear
+LevelScale procedure_scale(const ProcedureSpec& spec) {
+  if (const auto* staircase = std::get_if<Staircase>(&spec)) return staircase->scale;
+  if (const auto* quest = std::get_if<QuestPlus>(&spec)) return quest->function.scale;
+  if (const auto* limits = std::get_if<Limits>(&spec)) return limits->scale;
+  return LevelScale::linear;
+}
+
 }  // namespace
 
 std::string level_text(double level) {
@@ -195,13 +203,6 @@ std::optional<Easier> easier_of(const ProcedureSpec& spec) {
   if (const auto* quest = std::get_if<QuestPlus>(&spec)) return quest->function.easier;
   if (const auto* limits = std::get_if<Limits>(&spec)) return limits->easier;
   return std::nullopt;
-}
-
-LevelScale procedure_scale(const ProcedureSpec& spec) {
-  if (const auto* staircase = std::get_if<Staircase>(&spec)) return staircase->scale;
-  if (const auto* quest = std::get_if<QuestPlus>(&spec)) return quest->function.scale;
-  if (const auto* limits = std::get_if<Limits>(&spec)) return limits->scale;
-  return LevelScale::linear;
 }
 
 PsychometricParticipant typical_participant(const Protocol& protocol, const TaskBlock& block,

@@ -60,6 +60,5 @@ PsychometricParticipant typical_participant(const Protocol& protocol, const Task
 
 /// The direction in which a procedure's levels get easier; nullopt for constant stimuli.
 std::optional<Easier> easier_of(const ProcedureSpec& spec);
-LevelScale procedure_scale(const ProcedureSpec& spec);  ///< constant stimuli: linear
 
 }  // namespace palpate::protocols

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "rendering/separation.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/vec.h"
 
 namespace palpate::rendering {

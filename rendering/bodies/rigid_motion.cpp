@@ -11,6 +11,7 @@
 #include <stdexcept>
 
 #include "rendering/surface_search.h"
+#include "stimuli/convex_mesh.h"
 
 namespace palpate::rendering {
 namespace {

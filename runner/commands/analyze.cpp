@@ -23,9 +23,9 @@
 #include "data/base/text.h"
 #include "data/stored_protocol.h"
 #include "protocols/json_document.h"
-#include "runner/commands/movement/movement_study.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/sweep/planned.h"
+#include "runner/movement/movement_study.h"
 #include "runner/output/outputs.h"
 #include "runner/registration/bundle_contents.h"
 #include "runner/study/study_trials.h"
@@ -135,10 +135,10 @@ void require_measures(const analysis::MovementTable& table, const std::string& d
                      reasons + ")");
 }
 
-void analyze_movement_of(MovementRequest request, output::Outputs& outputs) {
+void analyze_movement_of(movement::MovementRequest request, output::Outputs& outputs) {
   request.pictures = outputs.wanted("report") || outputs.wanted("figures");
-  MovementStudy study = measure_study(request);
-  require_samples(study, request.database);
+  movement::MovementStudy study = movement::measure_study(request);
+  movement::require_samples(study, request.database);
   require_measures(study.table, request.database);
   if (outputs.wanted("movement-csv")) outputs.put("movement-csv", study.csv);
   const analysis::MovementAnalysis found =
@@ -217,7 +217,7 @@ int analyze_command(const std::vector<std::string>& args) {
       "psychometric function of tasks: logistic, normal or weibull");
   add("scale", po::value(&scale)->value_name("NAME"),
       "of the levels of psychometric functions: linear or log; default: the procedure's");
-  MovementRequest movement;
+  movement::MovementRequest movement;
   movement.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   std::string movement_csv;
   add("movement", "measure the movement of the hand instead of the times");

@@ -24,6 +24,8 @@
 #include "runner/evidence/tick_meters.h"
 #include "runner/output/outputs.h"
 #include "stimuli/closed_surface.h"
+#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::commands {

@@ -16,12 +16,12 @@
 #include "data/export/settings.h"
 #include "data/store/store.h"
 #include "data/store/sweep_file.h"
-#include "runner/commands/movement/movement_study.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/protocol_choice.h"
+#include "runner/movement/movement_study.h"
 #include "runner/movement/touched_trial.h"
 #include "runner/output/progress_line.h"
 #include "runner/registration/about_file.h"
+#include "runner/station/protocol_choice.h"
 #include "runner/study/export_settings.h"
 
 namespace palpate::runner::commands {
@@ -38,7 +38,7 @@ class MovementExport {
   /// Adds places and normals of the contacts to the samples, by rendering each trial again.
   void add_contacts(data::ExportSettings& settings);
   /// Tables of the measures. \throws UsageError: no trial has samples
-  void add_measures(data::ExportSettings& settings, const MovementRequest& request);
+  void add_measures(data::ExportSettings& settings, const movement::MovementRequest& request);
   /// Trials without contacts because rendering does not reproduce their recorded forces.
   std::size_t not_rendered() const { return not_rendered_; }
 
@@ -46,7 +46,7 @@ class MovementExport {
   data::Store& store_;
   movement::StudyStimuli stimuli_;
   std::size_t not_rendered_ = 0;
-  std::map<MovementStudy::TrialKey, data::DerivedMeasures::Values> measured_;
+  std::map<movement::MovementStudy::TrialKey, data::DerivedMeasures::Values> measured_;
 };
 
 void MovementExport::add_contacts(data::ExportSettings& settings) {
@@ -57,9 +57,10 @@ void MovementExport::add_contacts(data::ExportSettings& settings) {
   };
 }
 
-void MovementExport::add_measures(data::ExportSettings& settings, const MovementRequest& request) {
-  MovementStudy study = measure_study(request);
-  require_samples(study, request.database);
+void MovementExport::add_measures(data::ExportSettings& settings,
+                                  const movement::MovementRequest& request) {
+  movement::MovementStudy study = movement::measure_study(request);
+  movement::require_samples(study, request.database);
   for (const auto& [trial, row] : study.rows) {
     data::DerivedMeasures::Values& values = measured_[trial];
     values.missing = study.missing[row];
@@ -75,7 +76,7 @@ void MovementExport::add_measures(data::ExportSettings& settings, const Movement
     derived.columns.push_back({one.name, std::string("Movement: ") + one.meaning, one.unit});
   }
   derived.of = [this](const data::StoredTrial& trial) {
-    const auto found = measured_.find(key_of(trial));
+    const auto found = measured_.find(movement::key_of(trial));
     if (found != measured_.end()) return found->second;
     return data::DerivedMeasures::Values{{}, "it was added while the export was written"};
   };
@@ -231,7 +232,7 @@ data::ExportResult write_export(const Request& request) {
   MovementExport hand(store, request.meshes);
   if (request.contacts) hand.add_contacts(settings);
   if (request.movement) {
-    MovementRequest measures;
+    movement::MovementRequest measures;
     measures.database = request.database;
     measures.mesh_folder = request.meshes;
     measures.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));

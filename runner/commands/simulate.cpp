@@ -110,7 +110,7 @@ int version_begun_with(data::Store& store, const std::string& protocol_sha256,
     all.insert(*known->second);
     if (run.protocol_sha256 == protocol_sha256) own.insert(*known->second);
   }
-  return version_to_go_on_with(own.empty() ? all : own, store.path());
+  return version_to_resume_with(own.empty() ? all : own, store.path());
 }
 
 /// \param seconds  run time

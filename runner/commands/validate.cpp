@@ -24,7 +24,9 @@
 #include "runner/touch/forces.h"
 #include "runner/touch/scene_notes.h"
 #include "stimuli/closed_surface.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/parts/convex_parts.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "stimuli/solids/solid_mesh.h"
 

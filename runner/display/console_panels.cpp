@@ -20,7 +20,7 @@ using namespace console_colour;
 using Kind = ConsoleCommand::Kind;
 
 const char* label_of(ConsoleCommand::Kind kind) {
-  return kind == ConsoleCommand::Kind::go_on          ? "Go on"
+  return kind == ConsoleCommand::Kind::resume         ? "Go on"
          : kind == ConsoleCommand::Kind::repeat_trial ? "Repeat"
                                                       : "End";
 }
@@ -358,7 +358,7 @@ void draw_buttons(const ConsoleState& state, bool compact, EndRequest& ending,
   button(in_trial ? "Pause after trial" : "Pause", Kind::pause,
          state.pauses || state.state == "paused");
   ImGui::SameLine();
-  button("Go on", Kind::go_on, false, !state.held_by.empty() && !off(state));
+  button("Go on", Kind::resume, false, !state.held_by.empty() && !off(state));
   button("Stop after trial", Kind::stop_after_trial, state.stop_plan == "after this trial");
   ImGui::SameLine();
   button("Stop after block", Kind::stop_after_block, state.stop_plan == "after this block");

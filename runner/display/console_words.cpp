@@ -8,13 +8,24 @@
 #include "runner/safety/fault_signals.h"
 
 namespace palpate::runner::display {
+namespace {
+
+/// The reason why forces are off, if session or servo gave one.
+std::string forces_off_reason(const ConsoleState& state) {
+  if (!state.fault.empty()) return state.fault;
+  const std::string words =
+      safety::fault_words(state.sample.faults & ~servo::servo_fault::kTripped);
+  return words.empty() ? safety::fault_row(servo::servo_fault::kTripped).why : words;
+}
+
+}  // namespace
 
 const char* button_label(ConsoleCommand::Kind kind) {
   using Kind = ConsoleCommand::Kind;
   switch (kind) {
     case Kind::pause:
       return "Pause";
-    case Kind::go_on:
+    case Kind::resume:
       return "Go on";
     case Kind::repeat_trial:
       return "Repeat trial";
@@ -36,13 +47,6 @@ const char* button_label(ConsoleCommand::Kind kind) {
       return "Correct an answer...";
   }
   return "";
-}
-
-std::string forces_off_reason(const ConsoleState& state) {
-  if (!state.fault.empty()) return state.fault;
-  const std::string words =
-      safety::fault_words(state.sample.faults & ~servo::servo_fault::kTripped);
-  return words.empty() ? safety::fault_row(servo::servo_fault::kTripped).why : words;
 }
 
 std::string state_title(const ConsoleState& state) {

@@ -10,8 +10,6 @@ namespace palpate::runner::display {
 
 /// The label of the button for a command.
 const char* button_label(ConsoleCommand::Kind kind);
-/// The reason why forces are off, if session or servo gave one.
-std::string forces_off_reason(const ConsoleState& state);
 /// State of the session in a word or two; and what it waits for, or the key to press.
 std::string state_title(const ConsoleState& state);
 std::string state_detail(const ConsoleState& state);

@@ -48,7 +48,7 @@ class TouchSource {
 struct ConsoleCommand {
   enum class Kind {
     pause,             ///< before the next trial
-    go_on,             ///< resumes after a pause or a cleared fault
+    resume,            ///< continues after a pause or a cleared fault
     repeat_trial,      ///< cuts off the current trial and shows it again
     stop_after_trial,  ///< the session ends; it can be resumed
     stop_after_block,

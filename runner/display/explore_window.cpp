@@ -55,7 +55,7 @@ class ExploreClip {
 
   using Draw = std::function<ScenePicture(const SceneMoment&)>;
   /// Draws the next picture. \return whether it was the last
-  bool go_on(const Draw& draw, const Theme& theme);
+  bool draw_next(const Draw& draw, const Theme& theme);
   double done() const;  ///< 0 to 1
   /// The animated WebP of the pictures drawn; call it last. Empty: none were drawn.
   std::string finish();
@@ -80,15 +80,15 @@ class ExploreView {
   void highlight_emergency(bool on) { emergency_highlit_ = on; }
 
   // Actions of keys.
-  void pause_or_go_on();
+  void pause_or_resume();
   void step(int moments);
   void keep_picture();
   void keep_clip();
 
-  /// Draws the rest of a clip and saves it. Calls `go_on` before each picture with the share done
+  /// Draws the rest of a clip and saves it. Calls `continues` before each picture with the share done
   /// (0 to 1); false ends the clip there. \return result of keep_picture; empty: no clip was in
   /// progress
-  std::string finish_clip(const std::function<bool(double)>& go_on);
+  std::string finish_clip(const std::function<bool(double)>& continues);
 
  private:
   void take_moments(double seconds);
@@ -147,7 +147,7 @@ ExploreClip::ExploreClip(const Timeline& timeline, const Camera& camera)
   }
 }
 
-bool ExploreClip::go_on(const Draw& draw, const Theme& theme) {
+bool ExploreClip::draw_next(const Draw& draw, const Theme& theme) {
   if (drawn_ < moments_.size()) {
     renderer_.draw(draw(moments_[drawn_]), camera_, theme, kWide, kHigh);
     animation_.add(renderer_.pixels(), static_cast<double>(drawn_) * kEvery);
@@ -327,7 +327,7 @@ void ExploreView::draw_time(float width) {
     ImGui::SameLine();
     return pressed;
   };
-  if (button(paused ? "Go on" : "Pause", 5.5F, paused ? Look::lit : Look::plain)) pause_or_go_on();
+  if (button(paused ? "Go on" : "Pause", 5.5F, paused ? Look::lit : Look::plain)) pause_or_resume();
   if (button("< tick", 4)) step(-1);
   if (button("tick >", 4)) step(1);
   if (button("Play", 4)) {
@@ -549,7 +549,7 @@ void ExploreView::take_moments(double seconds) {
 
 // A participant must not feel a state that is not shown: forces are off unless the newest moment is
 // shown.
-void ExploreView::pause_or_go_on() {
+void ExploreView::pause_or_resume() {
   const bool paused = timeline_.state() != Timeline::State::paused;
   if (paused) {
     timeline_.pause();
@@ -613,7 +613,7 @@ void ExploreView::keep_clip() {
 /// Draws the next picture. \return whether it was the last
 bool ExploreView::draw_clip() {
   const auto draw = [this](const SceneMoment& moment) { return picture(&moment); };
-  return clip_->go_on(draw, dark_ ? dark_theme() : light_theme());
+  return clip_->draw_next(draw, dark_ ? dark_theme() : light_theme());
 }
 
 void ExploreView::end_clip() {
@@ -634,9 +634,9 @@ void ExploreView::continue_clip() {
   } while (std::chrono::steady_clock::now() - began < kShare);
 }
 
-std::string ExploreView::finish_clip(const std::function<bool(double)>& go_on) {
+std::string ExploreView::finish_clip(const std::function<bool(double)>& continues) {
   if (clip_ == nullptr) return {};
-  while (go_on(clip_->done()) && !draw_clip()) {
+  while (continues(clip_->done()) && !draw_clip()) {
   }
   end_clip();
   return note_;
@@ -881,7 +881,7 @@ class ExploreWindow {
     ImGui_ImplGlfw_KeyCallback(window, key, scancode, action, mods);
     if (action == GLFW_RELEASE || ImGui::GetIO().WantTextInput) return;
     const int ticks = (mods & GLFW_MOD_SHIFT) != 0 ? kStepsOfPage : 1;
-    if (key == GLFW_KEY_SPACE && action == GLFW_PRESS) self.view_->pause_or_go_on();
+    if (key == GLFW_KEY_SPACE && action == GLFW_PRESS) self.view_->pause_or_resume();
     if (key == GLFW_KEY_LEFT) self.view_->step(-ticks);
     if (key == GLFW_KEY_RIGHT) self.view_->step(ticks);
     if (key == GLFW_KEY_S && action == GLFW_PRESS) self.keep_ = true;

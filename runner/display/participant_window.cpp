@@ -198,7 +198,7 @@ class KeyMap {
 };
 
 /// Draws the space bar with an arrow: "press to continue" without words.
-void draw_go_on(cairo_t* canvas, double middle, double top, double unit);
+void draw_continue(cairo_t* canvas, double middle, double top, double unit);
 /// Draws the session's progress along the upper edge.
 void draw_progress(cairo_t* canvas, const Page& page, double unit, double width);
 /// Draws the current step's instruction, then a line for each step.
@@ -411,7 +411,7 @@ void draw_typed(cairo_t* canvas, const std::string& typed, double middle, double
              kText);
 }
 
-void draw_go_on(cairo_t* canvas, double middle, double top, double unit) {
+void draw_continue(cairo_t* canvas, double middle, double top, double unit) {
   const double width = 9 * unit, height = 1.9 * unit;
   draw_keycap(canvas, std::round(middle - width / 2), std::round(top), std::round(width),
               std::round(height));
@@ -546,11 +546,11 @@ class PageLayout {
     const double margin = 2.5 * unit_;
     const bool continues = page.kind == Page::Kind::text;
     const bool typing = page.typing != Page::Typing::none;
-    go_on_top_ = height - margin - 1.9 * unit_;
+    continue_top_ = height - margin - 1.9 * unit_;
     keys_top_ =
-        (continues ? go_on_top_ - 2 * unit_ : height - margin - 1.2 * unit_) - keys_.height();
-    reply_top_ =
-        (page.keys.empty() ? (continues ? go_on_top_ : height - unit_) : keys_top_) - 2.4 * unit_;
+        (continues ? continue_top_ - 2 * unit_ : height - margin - 1.2 * unit_) - keys_.height();
+    reply_top_ = (page.keys.empty() ? (continues ? continue_top_ : height - unit_) : keys_top_) -
+                 2.4 * unit_;
     top_ = margin + 0.6 * unit_;
     typed_top_ = reply_top_ - (typing ? 4 * unit_ : 0);
     count_top_ = typed_top_ - (page.seconds_left > 0 ? 4.5 * unit_ : 0);
@@ -578,12 +578,12 @@ class PageLayout {
       draw_typed(canvas_, page_.typed, width_ / 2, typed_top_, unit_, text_width(width_, unit_));
     draw_progress(canvas_, page_, unit_, width_);
     if (page_.back)
-      TextBlock(canvas_, "\u2190", 1.4 * unit_).draw(canvas_, unit_, go_on_top_, kQuietInk);
+      TextBlock(canvas_, "\u2190", 1.4 * unit_).draw(canvas_, unit_, continue_top_, kQuietInk);
     if (page_.seconds_left > 0)
       draw_line(minutes_and_seconds(page_.seconds_left), 3 * unit_, count_top_, kQuietInk);
     if (!page_.reply.empty()) draw_line(page_.reply, 1.2 * unit_, reply_top_, kReply);
     if (page_.kind == Page::Kind::text) {
-      if (!answers) draw_go_on(canvas_, width_ / 2, go_on_top_, unit_);
+      if (!answers) draw_continue(canvas_, width_ / 2, continue_top_, unit_);
       draw_screen(screen);
     } else if (page_.kind == Page::Kind::checklist) {
       draw_checklist(canvas_, page_.checklist, unit_, width_, top_, room_);
@@ -620,14 +620,14 @@ class PageLayout {
     std::string place = page_.parts > 1 ? of(page_.part, page_.parts) : of(at + 1, count);
     if (page_.parts > 1 && count > 1) place += "  (" + of(at + 1, count) + ")";
     const TextBlock number(canvas_, place, unit_);
-    number.draw(canvas_, width_ / 2 + 6 * unit_, go_on_top_ + 0.3 * unit_, kQuietInk);
+    number.draw(canvas_, width_ / 2 + 6 * unit_, continue_top_ + 0.3 * unit_, kQuietInk);
   }
 
   cairo_t* canvas_;
   const Page& page_;
   double width_, unit_;
   KeyMap keys_;
-  double go_on_top_ = 0, keys_top_ = 0, reply_top_ = 0, count_top_ = 0, top_ = 0, room_ = 0;
+  double continue_top_ = 0, keys_top_ = 0, reply_top_ = 0, count_top_ = 0, top_ = 0, room_ = 0;
   double typed_top_ = 0, picture_ = 0, picture_top_ = 0;
 };
 

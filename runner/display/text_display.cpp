@@ -28,7 +28,7 @@ struct CommandText {
 
 constexpr CommandText kCommands[] = {
     {"pause", Kind::pause},
-    {"go", Kind::go_on},
+    {"go", Kind::resume},
     {"repeat", Kind::repeat_trial},
     {"stop", Kind::stop_after_trial},
     {"stop block", Kind::stop_after_block},
@@ -84,6 +84,14 @@ std::string text_of(const Page& page) {
   return text;
 }
 
+/// The text to type for a command, without the colon.
+std::string_view text_command(Kind kind) {
+  for (const CommandText& word : kCommands) {
+    if (kind == word.kind) return word.line;
+  }
+  return "note";
+}
+
 std::string checklist_text(const Checklist& list) {
   std::size_t due = 0;
   while (due < list.steps.size() && list.steps[due].state != Checklist::Step::State::now) ++due;
@@ -117,6 +125,19 @@ using std::chrono::steady_clock;
 
 constexpr std::size_t kMaxWrite = 256;  // bytes; poll() promises that a terminal takes these
 constexpr auto kFlushTime = std::chrono::milliseconds(300);  // for the remaining text at the end
+
+/// The list of commands of the text console.
+const char* text_commands_help() {
+  return "commands, each ended by Enter:\n"
+         "  :pause       before the next trial       :go          go on\n"
+         "  :repeat      show this trial again       :note TEXT   a note with its time\n"
+         "  :stop        end after this trial        :stop block  end after this block\n"
+         "               (repeat the command to cancel)\n"
+         "  :zero, Esc   emergency: forces off       :clear       allow forces again\n"
+         "  :quit        end at once                 :quit withdrawn  the participant withdraws\n"
+         "  :answer X    the participant's answer, spoken; without X: on to the next\n"
+         "  :correct PAGE QUESTION ANSWER  another answer to a question of a page\n";
+}
 
 class TextDisplay final : public DisplayLoop {
  public:
@@ -225,6 +246,24 @@ class TextDisplay final : public DisplayLoop {
   std::atomic<bool> ended_{false};
 };
 
+/// "pause", "note TEXT", ... without the colon. Unknown: kind note with an empty text.
+ConsoleCommand parse_text_command(std::string_view line, std::int64_t time_ns) {
+  line = trimmed(line);
+  const std::string said = lower(line);
+  for (const CommandText& word : kCommands) {
+    if (said != word.line) continue;
+    return {word.kind, word.kind == Kind::emergency_zero ? ":zero" : "", time_ns};
+  }
+  for (const auto& [word, kind] : {std::pair(std::string_view("note "), Kind::note),
+                                   std::pair(std::string_view("answer "), Kind::answer),
+                                   std::pair(std::string_view("correct "), Kind::correct),
+                                   std::pair(std::string_view("quit "), Kind::quit)}) {
+    if (said.rfind(word, 0) == 0)
+      return {kind, std::string(trimmed(line.substr(word.size()))), time_ns};
+  }
+  return {Kind::note, "", time_ns};
+}
+
 }  // namespace
 
 std::string wrapped(const std::string& text, std::size_t columns) {
@@ -251,42 +290,6 @@ std::string wrapped(const std::string& text, std::size_t columns) {
 std::size_t columns_of(int file) {
   winsize size{};
   return ioctl(file, TIOCGWINSZ, &size) == 0 ? size.ws_col : 0;
-}
-
-const char* text_commands_help() {
-  return "commands, each ended by Enter:\n"
-         "  :pause       before the next trial       :go          go on\n"
-         "  :repeat      show this trial again       :note TEXT   a note with its time\n"
-         "  :stop        end after this trial        :stop block  end after this block\n"
-         "               (repeat the command to cancel)\n"
-         "  :zero, Esc   emergency: forces off       :clear       allow forces again\n"
-         "  :quit        end at once                 :quit withdrawn  the participant withdraws\n"
-         "  :answer X    the participant's answer, spoken; without X: on to the next\n"
-         "  :correct PAGE QUESTION ANSWER  another answer to a question of a page\n";
-}
-
-std::string_view text_command(Kind kind) {
-  for (const CommandText& word : kCommands) {
-    if (kind == word.kind) return word.line;
-  }
-  return "note";
-}
-
-ConsoleCommand parse_text_command(std::string_view line, std::int64_t time_ns) {
-  line = trimmed(line);
-  const std::string said = lower(line);
-  for (const CommandText& word : kCommands) {
-    if (said != word.line) continue;
-    return {word.kind, word.kind == Kind::emergency_zero ? ":zero" : "", time_ns};
-  }
-  for (const auto& [word, kind] : {std::pair(std::string_view("note "), Kind::note),
-                                   std::pair(std::string_view("answer "), Kind::answer),
-                                   std::pair(std::string_view("correct "), Kind::correct),
-                                   std::pair(std::string_view("quit "), Kind::quit)}) {
-    if (said.rfind(word, 0) == 0)
-      return {kind, std::string(trimmed(line.substr(word.size()))), time_ns};
-  }
-  return {Kind::note, "", time_ns};
 }
 
 void TextInput::end_line(std::int64_t time_ns, std::vector<Event>& out) {

@@ -79,15 +79,6 @@ std::size_t columns_of(int file);
 // Parses terminal input: single keys are answers, a line that begins with ':' is a command, Escape
 // and F12 are emergency keys, and so is Alt with any key.
 
-/// The list of commands of the text console.
-const char* text_commands_help();
-
-/// The text to type for a command, without the colon.
-std::string_view text_command(ConsoleCommand::Kind kind);
-
-/// "pause", "note TEXT", ... without the colon. Unknown: kind note with an empty text.
-ConsoleCommand parse_text_command(std::string_view line, std::int64_t time_ns);
-
 class TextInput {
  public:
   struct Unknown {

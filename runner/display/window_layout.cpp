@@ -72,6 +72,14 @@ ScreenBox desktop(const std::vector<Monitor>& all) {
   return out;
 }
 
+/// The frame around a window; for a hidden window the future frame, if the window manager reports
+/// it.
+FrameSize frame_of(GLFWwindow* window) {
+  FrameSize frame;
+  glfwGetWindowFrameSize(window, &frame.left, &frame.top, &frame.right, &frame.bottom);
+  return frame;
+}
+
 /// The window manager's frame, if it reports one before a window is shown.
 FrameSize usual_frame() {
   glfwDefaultWindowHints();
@@ -130,6 +138,20 @@ void limit_sizes(WindowLayout& layout) {
 }
 
 int bar_height(double scale) { return scaled(kBarHeight, scale); }
+
+/// Space for the participant's window when it must not cover the console: the rest of the console's
+/// monitor. \param console  without its frame \param bar  height of its emergency button, px
+ScreenBox room_beside(const ScreenBox& console, int bar, const FrameSize& frame) {
+  const std::vector<Monitor> all = monitors();
+  const Monitor* const on = monitor_of(all, console);
+  const ScreenBox area = work_area(on != nullptr ? *on : all.front());
+  const ScreenBox beside = rest_of(area, with_frame(console, frame));
+  if (beside.width >= 2 * kLeast && beside.height >= kLeast)
+    return without_frame(beside, frame, kGap);
+  // The console fills the monitor: put the window on it, below the button.
+  const int below = std::clamp(console.top + bar, area.top, area.bottom());
+  return without_frame({area.left, below, area.width, area.bottom() - below}, frame, kGap);
+}
 
 /// Each window on its monitor, in the middle; both side by side where it is the same one, or where
 /// two show the same part of the desktop.
@@ -235,30 +257,25 @@ bool same_monitors(const WindowLayout& a, const WindowLayout& b) {
   return a.participant.monitor == b.participant.monitor && a.console.monitor == b.console.monitor;
 }
 
+/// The layout on the monitors that are left of one, or that are back.
+WindowLayout lay_out_again(const WindowSettings& settings, const WindowLayout& first) {
+  const std::vector<Monitor> all = monitors();
+  const auto still = [&](const std::string& name) -> const Monitor& {
+    const Monitor* const there = monitor_named(all, name);
+    return there != nullptr ? *there : all.front();
+  };
+  WindowLayout layout = lay_out(settings, still(first.participant.monitor.name),
+                                still(first.console.monitor.name), usual_frame());
+  limit_sizes(layout);
+  return layout;
+}
+
 }  // namespace
 
 std::string glfw_reason() {
   const char* reason = nullptr;
   glfwGetError(&reason);
   return reason != nullptr ? reason : "no reason given";
-}
-
-FrameSize frame_of(GLFWwindow* window) {
-  FrameSize frame;
-  glfwGetWindowFrameSize(window, &frame.left, &frame.top, &frame.right, &frame.bottom);
-  return frame;
-}
-
-ScreenBox room_beside(const ScreenBox& console, int bar, const FrameSize& frame) {
-  const std::vector<Monitor> all = monitors();
-  const Monitor* const on = monitor_of(all, console);
-  const ScreenBox area = work_area(on != nullptr ? *on : all.front());
-  const ScreenBox beside = rest_of(area, with_frame(console, frame));
-  if (beside.width >= 2 * kLeast && beside.height >= kLeast)
-    return without_frame(beside, frame, kGap);
-  // The console fills the monitor: put the window on it, below the button.
-  const int below = std::clamp(console.top + bar, area.top, area.bottom());
-  return without_frame({area.left, below, area.width, area.bottom() - below}, frame, kGap);
 }
 
 double single_scale(double wanted) { return scale_for(monitors().front(), wanted); }
@@ -296,18 +313,6 @@ WindowLayout lay_out_windows(const WindowSettings& settings) {
   } else {
     layout = lay_out(settings, participant, console, frame);
   }
-  limit_sizes(layout);
-  return layout;
-}
-
-WindowLayout lay_out_again(const WindowSettings& settings, const WindowLayout& first) {
-  const std::vector<Monitor> all = monitors();
-  const auto still = [&](const std::string& name) -> const Monitor& {
-    const Monitor* const there = monitor_named(all, name);
-    return there != nullptr ? *there : all.front();
-  };
-  WindowLayout layout = lay_out(settings, still(first.participant.monitor.name),
-                                still(first.console.monitor.name), usual_frame());
   limit_sizes(layout);
   return layout;
 }

@@ -32,13 +32,6 @@ struct WindowLayout {
 /// \throws DisplayError if a requested monitor is not connected
 WindowLayout lay_out_windows(const WindowSettings& settings);
 
-/// The layout on the monitors that are left of one, or that are back.
-WindowLayout lay_out_again(const WindowSettings& settings, const WindowLayout& first);
-
-/// Space for the participant's window when it must not cover the console: the rest of the console's
-/// monitor. \param console  without its frame \param bar  height of its emergency button, px
-ScreenBox room_beside(const ScreenBox& console, int bar, const FrameSize& frame);
-
 /// A window in the middle of the first monitor. \param width, height  px, at scale 1
 WindowGeometry lay_out_single(int width, int height, double scale);
 
@@ -48,10 +41,6 @@ double single_scale(double wanted);
 /// Puts a window that no monitor shows into the middle of the first one: its monitor was switched
 /// off.
 void bring_into_sight(GLFWwindow* window);
-
-/// The frame around a window; for a hidden window the future frame, if the window manager reports
-/// it.
-FrameSize frame_of(GLFWwindow* window);
 
 /// A hidden window with an OpenGL 3.3 context, made current. \throws DisplayError
 GLFWwindow* make_window(const std::string& title, const WindowGeometry& geometry);

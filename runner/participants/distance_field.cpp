@@ -6,6 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "stimuli/convex_mesh.h"
+
 namespace palpate::runner::participants {
 namespace {
 

@@ -13,9 +13,11 @@
 
 #include "data/base/random.h"
 #include "stimuli/closed_surface.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/grid_hull.h"
 #include "stimuli/inset.h"
 #include "stimuli/parts/convex_parts.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "stimuli/shapes.h"
 
@@ -148,6 +150,19 @@ bool in_cubic_zone(const Quat& q) {
   return x <= face && y <= face && z <= face && x + y + z <= w;
 }
 
+/// Point i of n of a super-Fibonacci spiral, evenly spread over all rotations (Alexa 2022,
+/// "Super-Fibonacci Spirals: Fast, Low-Discrepancy Sampling of SO(3)", algorithm 1).
+Quat super_fibonacci(int i, int n) {
+  constexpr double kPsi = 1.533751168755204288118041;  // Alexa's constant: psi^4 = psi + 4
+  const double s = i + 0.5;
+  const double inner = std::sqrt(s / n);
+  const double outer = std::sqrt(1 - s / n);
+  const double alpha = 2 * std::numbers::pi * s / std::numbers::sqrt2;
+  const double beta = 2 * std::numbers::pi * s / kPsi;
+  return Quat(inner * std::sin(alpha), inner * std::cos(alpha), outer * std::sin(beta),
+              outer * std::cos(beta));
+}
+
 std::vector<Mat3> cube_rotations() {
   std::vector<Mat3> rotations;
   for (int i = 0; i < kAllRotations; ++i) {
@@ -195,17 +210,6 @@ std::vector<PlacedPart> felt_parts(const stimuli::ObjectSpec& stimulus) {
   std::vector<PlacedPart> parts;
   add(stimulus, Pose{}, parts);
   return parts;
-}
-
-Quat super_fibonacci(int i, int n) {
-  constexpr double kPsi = 1.533751168755204288118041;  // Alexa's constant: psi^4 = psi + 4
-  const double s = i + 0.5;
-  const double inner = std::sqrt(s / n);
-  const double outer = std::sqrt(1 - s / n);
-  const double alpha = 2 * std::numbers::pi * s / std::numbers::sqrt2;
-  const double beta = 2 * std::numbers::pi * s / kPsi;
-  return Quat(inner * std::sin(alpha), inner * std::cos(alpha), outer * std::sin(beta),
-              outer * std::cos(beta));
 }
 
 std::vector<Quat> symmetries(const std::vector<PlacedPart>& parts, const DistanceField& field) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "runner/participants/distance_field.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/shapes.h"
 #include "stimuli/vec.h"
 
@@ -25,10 +26,6 @@ std::vector<PlacedPart> felt_parts(const stimuli::ObjectSpec& stimulus);
 bool can_be_felt(const stimuli::ObjectSpec& stimulus);
 
 // Distinguishable orientations of a stimulus.
-
-/// Point i of n of a super-Fibonacci spiral, evenly spread over all rotations (Alexa 2022,
-/// "Super-Fibonacci Spirals: Fast, Low-Discrepancy Sampling of SO(3)", algorithm 1).
-Quat super_fibonacci(int i, int n);
 
 /// The rotations about the origin that map a solid to itself, the identity first: its field then
 /// changes by at most a fifth of its spacing (root mean square, near the surface). An axis of

@@ -512,7 +512,7 @@ void search_lines(const DistanceField& field, const LineRows<kRoom>& rows, int c
   int active[kMostGroups];
   int left = 0;
   // Counts the group as active again if one of its lines has a place to be looked at.
-  const auto go_on = [&](int g, const Floats& farther, const Floats& so_far) {
+  const auto advance = [&](int g, const Floats& farther, const Floats& so_far) {
     next[g] = farther;
     going[g] = (farther < end) & (lane::min(farther, whole) <= crossings[g].end(so_far));
     active[left] = g;
@@ -525,7 +525,7 @@ void search_lines(const DistanceField& field, const LineRows<kRoom>& rows, int c
     const Floats d = lines.distances(Floats{});
     lane::store(Floats{}, best + first);
     lane::store(d, least + first);
-    go_on(g, step, d);
+    advance(g, step, d);
   }
   while (left > 0) {
     const int turns = std::exchange(left, 0);
@@ -539,7 +539,7 @@ void search_lines(const DistanceField& field, const LineRows<kRoom>& rows, int c
       const Floats now = closer ? d : so_far;
       lane::store(now, least + first);
       lane::store(closer ? place : best_so_far, best + first);
-      go_on(g, next[g] + lane::max(step, d - now), now);
+      advance(g, next[g] + lane::max(step, d - now), now);
     }
   }
   Floats reach = 0.5F * step;

@@ -243,6 +243,13 @@ HeadingSettings read_heading(const json& heading) {
   return s;
 }
 
+/// SHA-256 of complete settings. Keys unknown to their version count only if they differ from its
+/// behaviour, so the checksum of unpatched settings is that of the frozen file without spaces.
+std::string settings_checksum(json settings) {
+  remove_implied(settings, implied_settings(settings.at("version")));
+  return checksum_hex(settings.dump());
+}
+
 SimulatedSettings read(const json& j) {
   SimulatedSettings s;
   s.version = j.at("version");
@@ -297,6 +304,28 @@ SimulatedSettings read(const json& j) {
   return s;
 }
 
+/// The frozen settings of a version with every key: switches unknown to it have the values that
+/// describe its behaviour.
+/// \throws std::invalid_argument if there is no such version
+json complete_settings(int version) {
+  const json frozen = frozen_settings(version);
+  json settings = implied_settings(version);
+  settings.merge_patch(frozen);
+  return settings;
+}
+
+/// Applies the JSON merge patch (RFC 7396) in a file.
+/// \throws protocols::InputError naming unknown keys and wrong values
+void patch_settings(json& settings, const std::string& path) {
+  protocols::FaultList found(path);
+  const json patch = protocols::read_json(protocols::read_text_file(path), found);
+  found.throw_if_any();
+  Check check{path, false};
+  check.compare(patch, settings, "");
+  check.throw_if_any();
+  settings.merge_patch(patch);
+}
+
 json patched_settings(const std::string& patch_path, int version) {
   json settings = complete_settings(version);
   if (!patch_path.empty()) patch_settings(settings, patch_path);
@@ -323,32 +352,10 @@ std::string setting_fault(const std::string& pointer, const json& value, const j
   return "";
 }
 
-json complete_settings(int version) {
-  const json frozen = frozen_settings(version);
-  json settings = implied_settings(version);
-  settings.merge_patch(frozen);
-  return settings;
-}
-
-void patch_settings(json& settings, const std::string& path) {
-  protocols::FaultList found(path);
-  const json patch = protocols::read_json(protocols::read_text_file(path), found);
-  found.throw_if_any();
-  Check check{path, false};
-  check.compare(patch, settings, "");
-  check.throw_if_any();
-  settings.merge_patch(patch);
-}
-
 void check_settings(const json& settings) {
   Check check{"settings of the simulated participant", true};
   check.compare(settings, complete_settings(3), "");
   check.throw_if_any();
-}
-
-std::string settings_checksum(json settings) {
-  remove_implied(settings, implied_settings(settings.at("version")));
-  return checksum_hex(settings.dump());
 }
 
 std::vector<int> participant_versions() {

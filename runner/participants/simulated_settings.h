@@ -25,15 +25,6 @@ extern const FrozenSettings kFrozenSettings[];
 // The settings of simulated participants as JSON: frozen versions, values implied by older
 // versions, patches and the checksum.
 
-/// The frozen settings of a version with every key: switches unknown to it have the values that
-/// describe its behaviour.
-/// \throws std::invalid_argument if there is no such version
-nlohmann::json complete_settings(int version);
-
-/// Applies the JSON merge patch (RFC 7396) in a file.
-/// \throws protocols::InputError naming unknown keys and wrong values
-void patch_settings(nlohmann::json& settings, const std::string& path);
-
 /// The reason why a setting cannot have that value, as "must be ..."; empty: it can.
 /// \param pointer  JSON pointer into the complete settings
 /// \param now  the present value: a number must stay a number
@@ -42,10 +33,6 @@ std::string setting_fault(const std::string& pointer, const nlohmann::json& valu
 
 /// \throws protocols::InputError if a key is missing, unknown or has a wrong value
 void check_settings(const nlohmann::json& settings);
-
-/// SHA-256 of complete settings. Keys unknown to their version count only if they differ from its
-/// behaviour, so the checksum of unpatched settings is that of the frozen file without spaces.
-std::string settings_checksum(nlohmann::json settings);
 
 /// Place of the stylus in a percept with contact: as displayed, with its tip in the object; or
 /// moved out according to the force, with the contact on the surface.

@@ -18,6 +18,7 @@
 #include "runner/participants/shape_observer.h"
 #include "runner/participants/simulated.h"
 #include "runner/servo/sample.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::runner::participants {
 

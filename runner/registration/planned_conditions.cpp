@@ -81,6 +81,11 @@ std::string option_of(const std::string& measure) {
   return measure == kTime ? "--effect" : "--" + measure + "-effect";
 }
 
+/// "time", "jnd", ...: the measure of a plan.
+std::string name_of_measure(const analysis::PlanRecord& plan) {
+  return plan.measure() == nullptr ? kTime : to_string(plan.measure()->measure);
+}
+
 void require_measure(const analysis::PlanRecord& plan, const std::string& path,
                      const Protocol& protocol) {
   const std::string measure = name_of_measure(plan);
@@ -119,6 +124,20 @@ void require_shapes(const analysis::StudyModel& model, const std::string& path,
     throw UsageError(path + ": /model/log_ratio: expected a plan for the protocol's shapes (" +
                      printable(analysis::joined(shown)) + "); this one is for " +
                      printable(analysis::joined(planned)));
+}
+
+/// Trials of a participant in a cell, as the plan counts them; of several blocks the fewest.
+/// \pre a block gives the measure, or the protocol has no blocks
+std::size_t trials_of_cell(const Protocol& protocol, const analysis::PlanRecord& plan) {
+  const std::vector<int> blocks = conditions_of(protocol, plan).blocks;
+  if (is_of_identification(plan))
+    return trials_of_identification(protocol, blocks, plan.times() != nullptr);
+  std::size_t fewest = 0;
+  for (const int index : blocks) {
+    const std::size_t trials = trials_of(protocol.blocks[static_cast<std::size_t>(index)]);
+    fewest = fewest == 0 ? trials : std::min(fewest, trials);
+  }
+  return fewest;
 }
 
 void require_trials(const analysis::PlanRecord& plan, const std::string& path,
@@ -165,10 +184,6 @@ bool PlannedConditions::is_second(const protocols::Trial& trial) const {
   return trial.task_block != blocks.front() || trial.stimulus != first_stimulus;
 }
 
-std::string name_of_measure(const analysis::PlanRecord& plan) {
-  return plan.measure() == nullptr ? kTime : to_string(plan.measure()->measure);
-}
-
 PlannedConditions conditions_of(const Protocol& protocol, const analysis::PlanRecord& plan) {
   PlannedConditions out;
   const std::string measure = name_of_measure(plan);
@@ -187,18 +202,6 @@ PlannedConditions conditions_of(const Protocol& protocol, const analysis::PlanRe
   out.by_renderer = renderers.size() > 1;
   out.differ = out.by_renderer || (cells.size() > 1 && !is_of_identification(plan));
   return out;
-}
-
-std::size_t trials_of_cell(const Protocol& protocol, const analysis::PlanRecord& plan) {
-  const std::vector<int> blocks = conditions_of(protocol, plan).blocks;
-  if (is_of_identification(plan))
-    return trials_of_identification(protocol, blocks, plan.times() != nullptr);
-  std::size_t fewest = 0;
-  for (const int index : blocks) {
-    const std::size_t trials = trials_of(protocol.blocks[static_cast<std::size_t>(index)]);
-    fewest = fewest == 0 ? trials : std::min(fewest, trials);
-  }
-  return fewest;
 }
 
 const analysis::PlanRecord::Curve& fitting_curve(const Protocol& protocol,

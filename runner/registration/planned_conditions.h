@@ -25,10 +25,6 @@ struct PlannedConditions {
 PlannedConditions conditions_of(const protocols::Protocol& protocol,
                                 const analysis::PlanRecord& plan);
 
-/// Trials of a participant in a cell, as the plan counts them; of several blocks the fewest.
-/// \pre a block gives the measure, or the protocol has no blocks
-std::size_t trials_of_cell(const protocols::Protocol& protocol, const analysis::PlanRecord& plan);
-
 /// The curve for so many trials. \pre the plan fits the protocol
 const analysis::PlanRecord::Curve& fitting_curve(const protocols::Protocol& protocol,
                                                  const analysis::PlanRecord& plan);
@@ -36,8 +32,5 @@ const analysis::PlanRecord::Curve& fitting_curve(const protocols::Protocol& prot
 /// Requires a plan for a measure, shapes and trials that the protocol has. \throws UsageError
 void require_fitting(const analysis::PlanRecord& plan, const std::string& path,
                      const protocols::Protocol& protocol);
-
-/// "time", "jnd", ...: the measure of a plan.
-std::string name_of_measure(const analysis::PlanRecord& plan);
 
 }  // namespace palpate::runner::registration

@@ -40,6 +40,18 @@ void keep(GuardChannel& channel, const char* message) {
   std::strncpy(channel.message.data(), message, channel.message.size() - 1);
 }
 
+/// Waits while `word` is `value`, at most `for_ns`. May return early.
+void futex_wait(const std::atomic<std::uint32_t>& word, std::uint32_t value,
+                std::int64_t for_ns) noexcept {
+  if (for_ns <= 0) return;
+  const timespec time{for_ns / kNsPerSecond, for_ns % kNsPerSecond};
+  syscall(SYS_futex, &word, FUTEX_WAIT, value, &time, nullptr, 0);
+}
+
+void futex_wake(const std::atomic<std::uint32_t>& word) noexcept {
+  syscall(SYS_futex, &word, FUTEX_WAKE, 1, nullptr, nullptr, 0);
+}
+
 class Guard {
  public:
   Guard(GuardChannel& channel, servo::Device& device, const GuardSettings& settings, int runner)
@@ -177,6 +189,33 @@ constexpr int kUnanswered = 25;  // unanswered reads in a row after which forces
 constexpr auto kAnswerNap = std::chrono::milliseconds(2);
 constexpr auto kFarewell = std::chrono::seconds(2);  // for the guard to close the device
 
+/// Runs the guard in a newly forked process; returns when the process should exit. Passes forces
+/// only after a zero command from a runner that knows of all trips of the guard, so no stale force
+/// is ever felt. \param runner  process id
+void run_guard(GuardChannel& channel, const DeviceFactory& factory, const GuardSettings& settings,
+               int runner) noexcept {
+  // No force is possible yet, so end together with the runner.
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != runner) return;
+  stand_alone();
+  prctl(PR_SET_NAME, "palpate-guard");
+  try {
+    const std::unique_ptr<servo::Device> device = factory();
+    servo::request_realtime({settings.priority, true, -1});
+    prctl(PR_SET_PDEATHSIG, 0);
+    channel.capabilities.set(device->capabilities());
+    channel.state.store(GuardState::ready);
+    Guard(channel, *device, settings, runner).run();
+  } catch (const std::exception& error) {
+    fail(channel, error.what());
+    return;
+  } catch (...) {
+    fail(channel, "the device could not be opened");
+    return;
+  }
+  channel.state.store(GuardState::ended);
+}
+
 }  // namespace
 
 GuardedReading::GuardedReading(const servo::DeviceReading& from, std::uint32_t request_,
@@ -216,41 +255,6 @@ void FixedCapabilities::set(const servo::DeviceCapabilities& from) {
   simulated = from.simulated;
   any_rate = from.any_rate;
   max_torque = from.max_torque;
-}
-
-void futex_wait(const std::atomic<std::uint32_t>& word, std::uint32_t value,
-                std::int64_t for_ns) noexcept {
-  if (for_ns <= 0) return;
-  const timespec time{for_ns / kNsPerSecond, for_ns % kNsPerSecond};
-  syscall(SYS_futex, &word, FUTEX_WAIT, value, &time, nullptr, 0);
-}
-
-void futex_wake(const std::atomic<std::uint32_t>& word) noexcept {
-  syscall(SYS_futex, &word, FUTEX_WAKE, 1, nullptr, nullptr, 0);
-}
-
-void run_guard(GuardChannel& channel, const DeviceFactory& factory, const GuardSettings& settings,
-               int runner) noexcept {
-  // No force is possible yet, so end together with the runner.
-  prctl(PR_SET_PDEATHSIG, SIGKILL);
-  if (getppid() != runner) return;
-  stand_alone();
-  prctl(PR_SET_NAME, "palpate-guard");
-  try {
-    const std::unique_ptr<servo::Device> device = factory();
-    servo::request_realtime({settings.priority, true, -1});
-    prctl(PR_SET_PDEATHSIG, 0);
-    channel.capabilities.set(device->capabilities());
-    channel.state.store(GuardState::ready);
-    Guard(channel, *device, settings, runner).run();
-  } catch (const std::exception& error) {
-    fail(channel, error.what());
-    return;
-  } catch (...) {
-    fail(channel, "the device could not be opened");
-    return;
-  }
-  channel.state.store(GuardState::ended);
 }
 
 GuardedDevice::GuardedDevice(const DeviceFactory& factory, const GuardSettings& settings)

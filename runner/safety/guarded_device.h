@@ -77,11 +77,6 @@ struct GuardChannel {
                 std::atomic<GuardState>::is_always_lock_free);
 };
 
-/// Waits while `word` is `value`, at most `for_ns`. May return early.
-void futex_wait(const std::atomic<std::uint32_t>& word, std::uint32_t value,
-                std::int64_t for_ns) noexcept;
-void futex_wake(const std::atomic<std::uint32_t>& word) noexcept;
-
 struct GuardSettings {
   double rate = 1000;  ///< Hz, of the servo
   /// s; zero force after this time without a call of the runner (or after 5 periods if longer)
@@ -93,12 +88,6 @@ struct GuardSettings {
 };
 
 using DeviceFactory = std::function<std::unique_ptr<servo::Device>()>;
-
-/// Runs the guard in a newly forked process; returns when the process should exit. Passes forces
-/// only after a zero command from a runner that knows of all trips of the guard, so no stale force
-/// is ever felt. \param runner  process id
-void run_guard(GuardChannel& channel, const DeviceFactory& factory, const GuardSettings& settings,
-               int runner) noexcept;
 
 /// The runner's side of the watchdog. If a reading takes longer than half a period, the last one is
 /// repeated (DeviceTrouble::late). After many such readings in a row the device counts as lost

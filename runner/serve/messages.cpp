@@ -107,6 +107,13 @@ class MemberReader {
   std::vector<Refusal> faults_;
 };
 
+/// The field with the name used in messages; empty: none.
+std::optional<StreamField> stream_field(const std::string& name) {
+  for (const auto& [known, field] : kFields)
+    if (name == known) return field;
+  return {};
+}
+
 void read_fields(MemberReader& reader, Message& out) {
   const json* const fields = reader.member("fields", false);
   if (fields == nullptr) {
@@ -286,12 +293,6 @@ MessageRefused::MessageRefused(std::vector<Refusal> why, std::optional<std::int6
     : std::runtime_error(why.empty() ? "refused" : why.front().message),
       why_(std::move(why)),
       id_(id) {}
-
-std::optional<StreamField> stream_field(const std::string& name) {
-  for (const auto& [known, field] : kFields)
-    if (name == known) return field;
-  return {};
-}
 
 Message parse_message(const std::string& text) {
   const json root = read_text(text);

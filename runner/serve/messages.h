@@ -60,8 +60,6 @@ enum class MessageType {
 
 /// Fields that may follow time and tick in a row of a stream.
 enum class StreamField { tip, tail, force, rendered, contact, depth, object, faults, lateness };
-/// The field with the name used in messages; empty: none.
-std::optional<StreamField> stream_field(const std::string& name);
 
 /// What a program wants to be felt in a trial or in one of its intervals.
 struct Wanted {

@@ -383,7 +383,7 @@ class Network::Impl final : public Hub {
     });
   }
   void tell(std::string text) {
-    asio::post(io_, [this, text = std::move(text)] { tell_all(text); });
+    asio::post(io_, [this, text = std::move(text)] { send_to_all(text); });
   }
 
   /// A flooding client would take all of this thread's time.
@@ -425,7 +425,7 @@ class Network::Impl final : public Hub {
     if (message.type == MessageType::emergency) {  // bypasses queues and limits
       hooks_.emergency(client.id);
       client.send(accepted(message.id, {{"t_ns", now_ns()}}));
-      return tell_all(event("emergency", now, {{"by", client.id}}));
+      return send_to_all(event("emergency", now, {{"by", client.id}}));
     }
     if (client.in_second > kMostMessages) return refuse("busy", "at most 200 messages a second");
     answer(client, std::move(message), now);
@@ -435,7 +435,7 @@ class Network::Impl final : public Hub {
     if (client.role == Client::Role::control) {
       if (hooks_.forces_may_come()) {
         hooks_.zero();
-        tell_all(event("controller_gone", now_ns()));  // from now on no force is commanded
+        send_to_all(event("controller_gone", now_ns()));  // from now on no force is commanded
       }
       command({client.id, true, {}, true});
     }
@@ -694,7 +694,7 @@ class Network::Impl final : public Hub {
     return true;
   }
 
-  void tell_all(const std::string& text) {
+  void send_to_all(const std::string& text) {
     for (const auto& [id, client] : std::map(clients_))
       if (client->role != Client::Role::unknown) client->send(text);
   }
@@ -714,7 +714,7 @@ class Network::Impl final : public Hub {
       if (on && !silent_ && now - controller_heard_ns_ > kSilence) {
         silent_ = true;
         hooks_.silence();
-        tell_all(event("client_silent", now, {{"since_ns", controller_heard_ns_}}));
+        send_to_all(event("client_silent", now, {{"since_ns", controller_heard_ns_}}));
       }
       watch();
     });

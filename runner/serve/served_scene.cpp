@@ -7,6 +7,7 @@
 #include "runner/safety/fault_signals.h"
 #include "runner/scene_builder.h"
 #include "runner/session/device_check.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::runner::serve {
 namespace {

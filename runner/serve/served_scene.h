@@ -19,6 +19,7 @@
 #include "runner/session/live_forces.h"
 #include "runner/session/markers.h"
 #include "runner/session/sample_stream.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::runner::serve {
 

@@ -282,7 +282,7 @@ void ServedSession::obey(const Asked& asked) {
     case MessageType::start:
       return start(asked);
     case MessageType::next:
-      return go_on(asked);
+      return show_next(asked);
     case MessageType::answer:
       return answer(asked);
     case MessageType::stop:
@@ -436,7 +436,7 @@ participants::Answer ServedSession::answer_of(const Message& message) const {
   return out;
 }
 
-void ServedSession::go_on(const Asked& asked) {
+void ServedSession::show_next(const Asked& asked) {
   if (!in_trial_ || !begun_ || goes_on_)
     throw MessageRefused("nothing-felt", "no interval is felt that another one follows");
   if (view_.answers) throw MessageRefused("last-interval", "the trial has no more intervals");

@@ -103,7 +103,7 @@ class ServedSession final : public participants::Respondent, public session::Ses
   void attend();
   void obey(const Asked& asked);
   void start(const Asked& asked);
-  void go_on(const Asked& asked);
+  void show_next(const Asked& asked);
   void answer(const Asked& asked);
   void clear(const Asked& asked);
   void left();

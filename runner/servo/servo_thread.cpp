@@ -55,7 +55,7 @@ void ServoThread::run() noexcept {
     publish(sample);
     if (sample.phase == Phase::feeling) felt_at_ = sample.probe;
     if (steps_left_ > 0) count_step();
-    if (waits_) go_on_when_back(sample.probe);
+    if (waits_) resume_when_back(sample.probe);
   }
   servo_.stop();
 }
@@ -102,7 +102,7 @@ void ServoThread::take_requests() noexcept {
 
 /// The stylus may have been moved while the scene was stopped: it must not pass through objects in
 /// one tick.
-void ServoThread::go_on_when_back(const rendering::LineProbe& probe) noexcept {
+void ServoThread::resume_when_back(const rendering::LineProbe& probe) noexcept {
   const double away = felt_at_ ? std::max(glm::distance(probe.tip, felt_at_->tip),
                                           glm::distance(probe.tail, felt_at_->tail))
                                : 0;

@@ -114,7 +114,7 @@ class ServoThread final : public TickSource {
   void run() noexcept;
   void take_requests() noexcept;
   void begin_ramp(FeelRamp* ramp) noexcept;
-  void go_on_when_back(const rendering::LineProbe& probe) noexcept;
+  void resume_when_back(const rendering::LineProbe& probe) noexcept;
   void count_step() noexcept;
   void publish(const Sample& sample) noexcept;
   void publish_places(const Sample& sample) noexcept;

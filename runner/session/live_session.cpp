@@ -214,8 +214,8 @@ void LiveSession::obey(const display::ConsoleCommand& command) {
       hold_.pause();
       say(in_trial ? "pause after this trial" : "paused");
       break;
-    case Kind::go_on:
-      hold_.go_on();
+    case Kind::resume:
+      hold_.resume();
       break;
     case Kind::repeat_trial:
       if (in_trial) throw participants::TrialCutOff("repeated by the experimenter");

@@ -78,7 +78,7 @@ class PreflightDialogue {
       obey(command);
       if (!state_.fault.empty()) continue;
       // A key pressed during the push does not confirm that it was felt.
-      if (command.kind == Kind::go_on && command.time_ns >= pushed_ns_) preflight_.skip();
+      if (command.kind == Kind::resume && command.time_ns >= pushed_ns_) preflight_.skip();
       if (command.kind == Kind::repeat_trial) preflight_.repeat();
     }
   }
@@ -106,7 +106,7 @@ class PreflightDialogue {
       case Kind::clear_fault:
         clear_fault();
         break;
-      case Kind::go_on:
+      case Kind::resume:
       case Kind::repeat_trial:
         break;
     }
@@ -352,11 +352,11 @@ display::Checklist Preflight::checklist() const {
   }
   list.instruction = instruction();
   if (step_ == Step::limits && push_ == Push::given) {
-    list.choices = {{Kind::go_on, "yes"}, {Kind::repeat_trial, "once more"}, {Kind::quit, "no"}};
+    list.choices = {{Kind::resume, "yes"}, {Kind::repeat_trial, "once more"}, {Kind::quit, "no"}};
   } else if (step_ == Step::limits) {
-    list.choices = {{Kind::go_on, "push"}};
+    list.choices = {{Kind::resume, "push"}};
   } else if (step_ == Step::range || step_ == Step::buttons) {
-    list.choices = {{Kind::go_on, "leave it unchecked"}};
+    list.choices = {{Kind::resume, "leave it unchecked"}};
   }
   return list;
 }

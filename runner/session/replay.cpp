@@ -302,6 +302,21 @@ ForceSummary render_other(const protocols::Protocol& protocol, const data::Trial
   return shown.over(out.ticks.size());
 }
 
+/// The samples of each interval of a trial, in order; the record begins with tick 0 in each. A
+/// trial of version 1 has one interval.
+std::vector<std::span<const data::SampleRecord>> samples_of_intervals(
+    const data::TrialRecord& recorded) {
+  std::vector<std::span<const data::SampleRecord>> intervals;
+  const std::span<const data::SampleRecord> all(recorded.samples);
+  std::size_t begin = 0;
+  for (std::size_t i = 1; i <= all.size(); ++i) {
+    if (i < all.size() && all[i].tick > all[i - 1].tick) continue;
+    intervals.push_back(all.subspan(begin, i - begin));
+    begin = i;
+  }
+  return intervals;
+}
+
 }  // namespace
 
 ReplayDevice::ReplayDevice(std::span<const data::SampleRecord> samples, double rate)
@@ -361,19 +376,6 @@ RecordedTrial load_recorded_trial(data::Store& store, const data::TrialName& nam
   }
   trial.limited = limit_as_recorded(trial.protocol, store, trial.stored);
   return trial;
-}
-
-std::vector<std::span<const data::SampleRecord>> samples_of_intervals(
-    const data::TrialRecord& recorded) {
-  std::vector<std::span<const data::SampleRecord>> intervals;
-  const std::span<const data::SampleRecord> all(recorded.samples);
-  std::size_t begin = 0;
-  for (std::size_t i = 1; i <= all.size(); ++i) {
-    if (i < all.size() && all[i].tick > all[i - 1].tick) continue;
-    intervals.push_back(all.subspan(begin, i - begin));
-    begin = i;
-  }
-  return intervals;
 }
 
 std::vector<std::optional<stimuli::ObjectSpec>> shown_objects(const protocols::Protocol& protocol,

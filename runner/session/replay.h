@@ -14,6 +14,7 @@
 #include "protocols/protocol.h"
 #include "runner/servo/device.h"
 #include "runner/servo/sample.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/shapes.h"
 #include "stimuli/vec.h"
 
@@ -76,11 +77,6 @@ protocols::Protocol protocol_as_shown(data::Store& store, const data::StoredTria
 
 /// "P03/1/12"
 std::string to_string(const data::TrialName& name);
-
-/// The samples of each interval of a trial, in order; the record begins with tick 0 in each. A
-/// trial of version 1 has one interval.
-std::vector<std::span<const data::SampleRecord>> samples_of_intervals(
-    const data::TrialRecord& recorded);
 
 /// The object of each interval, placed in the world as at its beginning; nullopt: no object.
 /// \throws std::invalid_argument where protocol and record do not agree

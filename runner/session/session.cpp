@@ -132,7 +132,8 @@ servo::HomeZone Session::home_of(const protocols::Interval& interval, double res
   return {reach + station_.protocol.home.margin, std::max(rest, station_.protocol.home.rest)};
 }
 
-void Session::tell_interval(const protocols::Trial& trial, const participants::IntervalView& view) {
+void Session::report_interval(const protocols::Trial& trial,
+                              const participants::IntervalView& view) {
   if (task_of(trial).order == protocols::BlockOrder::shapes) return;
   if (events_ != nullptr) events_->interval(trial, view);
   participant_.begin_interval(trial, view);
@@ -178,7 +179,7 @@ std::optional<participants::Answer> Session::show_intervals(const protocols::Tri
     for (int i = 0; i < count; ++i) {
       const protocols::Interval& interval = trial.intervals[static_cast<std::size_t>(i)];
       const participants::IntervalView view{i + 1, count, i + 1 == count, true, &interval};
-      tell_interval(trial, view);
+      report_interval(trial, view);
       prepare_interval(trial, interval, home_of(interval, i > 0 ? block.inter_interval : 0));
       const std::optional<double> limit =
           view.answers && !block.interval_limit ? block.time_out : block.interval_limit;
@@ -203,7 +204,7 @@ std::optional<participants::Answer> Session::ask_without_forces(const protocols:
                                                                 ServoState& servo) {
   const auto count = static_cast<int>(trial.intervals.size());
   const participants::IntervalView view{count, count, true, false, nullptr};
-  tell_interval(trial, view);
+  report_interval(trial, view);
   const protocols::Interval nothing{-1, trial.renderer};
   station_.servo.prepare(scenes_.scene(trial, nothing), renderer_for(trial.renderer), {0, 0});
   const auto answer = wait_in_interval(view, task_of(trial).time_out, servo);
@@ -224,7 +225,7 @@ std::optional<participants::Answer> Session::adjust(const protocols::Trial& tria
   while (true) {
     const protocols::Interval& shown = standard ? trial.intervals[1] : own;
     const participants::IntervalView view{standard ? 2 : 1, 2, true, true, &shown, turned};
-    tell_interval(trial, view);
+    report_interval(trial, view);
     prepare_interval(trial, shown, home);
     const double spent =
         first_onset_ns == 0
@@ -323,7 +324,7 @@ void Session::ask_level() {
                     event.dump(-1, ' ', true, nlohmann::ordered_json::error_handler_t::replace));
 }
 
-void Session::tell_level() {
+void Session::report_level() {
   if (station_.advisor != nullptr && protocols::is_adaptive(task_of(station_.plan.next())))
     station_.advisor->tell(record_);
 }
@@ -358,7 +359,7 @@ void Session::show_pages(PageSpec::When when, const std::string& block) {
     const bool asks = !questions_of(page).empty();
     if (!asks || !open_questions(page, station_.log.answers()).empty()) show_page(page);
   }
-  tell_page({});
+  report_page({});
 }
 
 /// Each answer is durable before the next question is shown. After an interruption the page begins
@@ -368,14 +369,14 @@ void Session::show_page(const PageSpec& page) {
   const std::vector<PageItem> items = questions_of(page);
   const std::vector<std::size_t> open = open_questions(page, station_.log.answers());
   PageView view{page.name, "", 0, static_cast<int>(items.size())};
-  tell_page(view);
+  report_page(view);
   if (!consent && open.size() == items.size())
     participant_.read_screens(screens_of(page.text, page.pictures));
   for (std::size_t at = items.empty() ? 0 : open.front(); at < items.size();) {
     const PageItem& item = items[at];
     view.question = item.name;
     view.number = static_cast<int>(at) + 1;
-    tell_page(view);
+    report_page(view);
     const bool number_follows =
         at + 1 < items.size() && items[at + 1].kind == PageItem::Kind::number;
     const std::optional<std::string> given = answer_to(page, item, station_.log.answers());
@@ -398,7 +399,7 @@ void Session::store_answer(const PageSpec& page, const PageItem& item, const std
       {page.name, item.name, page.version, checksum_hex(shown), answer, station_.clock.now_ns()});
 }
 
-void Session::tell_page(const PageView& view) {
+void Session::report_page(const PageView& view) {
   if (events_ != nullptr) events_->page(view);
 }
 
@@ -462,8 +463,8 @@ void Session::step() {
     case State::response:
       station_.log.finish(record_);
       if (events_ != nullptr) events_->recorded(record_);
-      tell_level();
-      tell_feedback();
+      report_level();
+      give_feedback();
       state_ = before_trial();
       if (state_ == State::end) {
         show_pages(protocols::PageSpec::When::after);
@@ -475,7 +476,7 @@ void Session::step() {
   }
 }
 
-void Session::tell_feedback() {
+void Session::give_feedback() {
   const protocols::TaskBlock& block = station_.plan.block();
   const bool feedback = block.feedback || (record_.practice && block.practice_feedback);
   station_.plan.answered(

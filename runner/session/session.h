@@ -70,23 +70,23 @@ class Session {
                                                        std::optional<double> limit,
                                                        ServoState& servo);
   void end_interval();
-  void tell_interval(const protocols::Trial& trial, const participants::IntervalView& view);
+  void report_interval(const protocols::Trial& trial, const participants::IntervalView& view);
   void judge(const protocols::Trial& trial, const participants::Answer& answer);
   void ask_confidence(const protocols::ConfidenceSpec& asked);
   void begin_task_block();
   void ask_level();
-  void tell_level();
+  void report_level();
   void read_instructions(const protocols::TaskBlock& block);
   void resume_task_block();
   void show_pages(protocols::PageSpec::When when, const std::string& block = "");
   void show_page(const protocols::PageSpec& page);
   void store_answer(const protocols::PageSpec& page, const protocols::PageItem& item,
                     const std::string& answer);
-  void tell_page(const PageView& view);
+  void report_page(const PageView& view);
   void cut_off(const std::string& reason);
   void rest_between_blocks();
   void rest();
-  void tell_feedback();
+  void give_feedback();
   void add_quality(const servo::ServoQuality& quality);
   void take_answer(const protocols::Trial& trial,
                    const std::optional<participants::Answer>& answer);

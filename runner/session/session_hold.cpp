@@ -33,7 +33,7 @@ void SessionHold::emergency_zero(const std::string& by, bool in_trial) {
 }
 
 std::string SessionHold::how_to_continue() const {
-  const std::string go = station_.console.name_of(display::ConsoleCommand::Kind::go_on);
+  const std::string go = station_.console.name_of(display::ConsoleCommand::Kind::resume);
   if (kind_ != Kind::fault) return "to continue: " + go;
   return "to continue: " + station_.console.name_of(display::ConsoleCommand::Kind::clear_fault) +
          ", then " + go;
@@ -71,7 +71,7 @@ bool SessionHold::clear_fault() {
   return true;
 }
 
-void SessionHold::go_on() {
+void SessionHold::resume() {
   if (kind_ == Kind::none) {
     say_("nothing is paused");
   } else if (kind_ == Kind::fault) {

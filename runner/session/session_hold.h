@@ -48,7 +48,7 @@ class SessionHold {
   /// The experimenter reports the cause removed. True: forces are allowed again and the session is
   /// paused; false: forces stay off, or there is no fault. Reports either.
   bool clear_fault();
-  void go_on();
+  void resume();
   /// Call when the session resumes: the next hold has its own reason.
   void forget_reason() { reason_.clear(); }
 

@@ -235,6 +235,24 @@ std::string table_text(const std::vector<RecoveredProcedure>& all, int participa
   return text;
 }
 
+/// All trials of a participant. Those of adaptive blocks depend on answers, here of a participant
+/// whose threshold is in the middle of the levels.
+std::vector<protocols::Trial> example_trials(const protocols::Protocol& protocol, int participant) {
+  std::vector<protocols::Trial> trials;
+  Random random(protocol.seed, {static_cast<std::uint64_t>(participant), 0x5c});
+  for (int session = 1; session <= protocol.sessions.count; ++session) {
+    protocols::SessionPlan plan(protocol, participant, session);
+    while (!plan.finished()) {
+      const protocols::Trial& trial = plan.next();
+      const auto& block = protocols::block_of(protocol, trial);
+      const bool success = succeeds(protocol, block, trial, random);
+      trials.push_back(trial);
+      plan.answered({success, success, true});
+    }
+  }
+  return trials;
+}
+
 }  // namespace
 
 std::string task_schedule_text(const protocols::Protocol& protocol, int participant,
@@ -271,22 +289,6 @@ std::vector<std::string> in_words(const protocols::Protocol& protocol,
   for (const protocols::ProcedureSpec& procedure : block.procedures)
     lines.push_back(in_words(procedure));
   return lines;
-}
-
-std::vector<protocols::Trial> example_trials(const protocols::Protocol& protocol, int participant) {
-  std::vector<protocols::Trial> trials;
-  Random random(protocol.seed, {static_cast<std::uint64_t>(participant), 0x5c});
-  for (int session = 1; session <= protocol.sessions.count; ++session) {
-    protocols::SessionPlan plan(protocol, participant, session);
-    while (!plan.finished()) {
-      const protocols::Trial& trial = plan.next();
-      const auto& block = protocols::block_of(protocol, trial);
-      const bool success = succeeds(protocol, block, trial, random);
-      trials.push_back(trial);
-      plan.answered({success, success, true});
-    }
-  }
-  return trials;
 }
 
 std::vector<std::string> keyboard_parts(const protocols::Protocol& protocol) {

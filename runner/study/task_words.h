@@ -51,10 +51,6 @@ std::string in_words(const protocols::ProcedureSpec& procedure);
 std::vector<std::string> in_words(const protocols::Protocol& protocol,
                                   const protocols::TaskBlock& block);
 
-/// All trials of a participant. Those of adaptive blocks depend on answers, here of a participant
-/// whose threshold is in the middle of the levels.
-std::vector<protocols::Trial> example_trials(const protocols::Protocol& protocol, int participant);
-
 /// Parts of a protocol of version 2 that the eight buttons of a device cannot answer, so that a
 /// session with --buttons needs a keyboard: "numbers of 'estimate'", ...
 std::vector<std::string> keyboard_parts(const protocols::Protocol& protocol);

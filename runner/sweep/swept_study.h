@@ -12,6 +12,7 @@
 #include "protocols/parse.h"
 #include "protocols/sweep_space.h"
 #include "runner/participants/simulated_settings.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::runner::sweep {
 

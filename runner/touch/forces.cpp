@@ -12,6 +12,7 @@
 #include "protocols/protocol.h"
 #include "runner/scene_builder.h"
 #include "runner/usage_error.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::runner::touch {
 namespace {

@@ -12,6 +12,7 @@
 #include "rendering/renderer.h"
 #include "runner/output/outputs.h"
 #include "runner/scene_builder.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::runner::touch {
 

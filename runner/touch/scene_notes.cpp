@@ -11,6 +11,7 @@
 #include "data/base/text.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/mesh_file.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "stimuli/solids/solid_mesh.h"
 
@@ -57,8 +58,8 @@ std::string solid_note(const stimuli::ObjectSpec& object) {
          std::to_string(solid.nodes.size()) + " nodes" + unit_advice(high - low, object.file_name);
 }
 
-}  // namespace
-
+/// A sentence with its place for each object that falls through others, because soft objects touch
+/// only the tool. Without line ends.
 std::vector<std::string> objects_passed_through(const protocols::SceneSpec& scene) {
   const auto is_soft = [](const stimuli::ObjectSpec& object) { return object.soft.has_value(); };
   const bool any_soft = std::any_of(scene.objects.begin(), scene.objects.end(), is_soft);
@@ -77,6 +78,8 @@ std::vector<std::string> objects_passed_through(const protocols::SceneSpec& scen
   }
   return notes;
 }
+
+}  // namespace
 
 std::optional<std::string> elements_felt(const rendering::SoftObject& object) {
   const double spacing = object.node_spacing(), radius = object.contact.radius;

@@ -11,10 +11,6 @@
 
 namespace palpate::runner::touch {
 
-/// A sentence with its place for each object that falls through others, because soft objects touch
-/// only the tool. Without line ends.
-std::vector<std::string> objects_passed_through(const protocols::SceneSpec& scene);
-
 /// A sentence if the tool is smaller than the object's elements, so that it feels each of them.
 std::optional<std::string> elements_felt(const rendering::SoftObject& object);
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "runner/session/replay.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::runner::touch {

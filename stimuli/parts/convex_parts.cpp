@@ -14,11 +14,13 @@
 
 #include "data/base/random.h"
 #include "stimuli/closed_surface.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/half_edges.h"
 #include "stimuli/mesh_names.h"
 #include "stimuli/parts/cell.h"
 #include "stimuli/parts/convex_sets.h"
 #include "stimuli/parts/facets.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::stimuli {

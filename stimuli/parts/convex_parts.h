@@ -5,12 +5,14 @@
 #include <string>
 #include <vector>
 
-#include "stimuli/convex_mesh.h"
 #include "stimuli/mesh_names.h"
 #include "stimuli/parts/cell.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::stimuli {
+
+class ConvexMesh;
 
 // Checks that convex parts cover a solid exactly.
 

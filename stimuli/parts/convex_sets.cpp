@@ -12,6 +12,8 @@
 #include <utility>
 
 #include "stimuli/closed_surface.h"
+#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "stimuli/mesh_names.h"
 #include "stimuli/parts/facets.h"
 
 namespace palpate::stimuli {

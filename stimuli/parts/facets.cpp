@@ -7,8 +7,11 @@
 #include <numeric>
 #include <vector>
 
+#include "stimuli/convex_mesh.h"
 #include "stimuli/coplanar.h"
 #include "stimuli/face_triangles.h"
+#include "stimuli/mesh_names.h"
+#include "stimuli/plane_deviation.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "stimuli/half_edges.h"
+#include "stimuli/mesh_names.h"
 #include "stimuli/parts/cell.h"
 
 namespace palpate::stimuli {

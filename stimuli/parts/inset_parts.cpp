@@ -12,8 +12,10 @@
 #include <utility>
 
 #include "data/base/random.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/inset.h"
 #include "stimuli/parts/convex_sets.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -5,8 +5,11 @@
 #include <glm/geometric.hpp>
 #include <utility>
 
+#include "stimuli/convex_mesh.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/parts/convex_sets.h"
+#include "stimuli/plane_deviation.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::stimuli {

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/shapes.h"
 #include "stimuli/vec.h"
 

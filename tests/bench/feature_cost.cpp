@@ -14,6 +14,8 @@
 #include "rendering/probes.h"
 #include "rendering/tick.h"
 #include "runner/evidence/verification/random_solids.h"
+#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "tests/bench/least_tick.h"
 #include "tests/bench/measured_tick.h"

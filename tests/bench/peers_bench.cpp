@@ -21,6 +21,7 @@
 #include "runner/evidence/tick_meters.h"
 #include "runner/evidence/verification/random_solids.h"
 #include "runner/evidence/verification/reference.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::bench {

@@ -28,6 +28,7 @@
 #include "runner/evidence/tick_meters.h"
 #include "runner/evidence/verification/random_solids.h"
 #include "stimuli/closed_surface.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::bench {

@@ -9,6 +9,7 @@
 #include "stimuli/closed_surface.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/parts/convex_parts.h"
+#include "stimuli/polygon_soup.h"
 #include "tests/fuzz/feel.h"
 #include "tests/fuzz/input_file.h"
 

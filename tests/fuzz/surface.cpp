@@ -19,6 +19,7 @@
 
 #include "rendering/renderer.h"
 #include "stimuli/closed_surface.h"
+#include "stimuli/polygon_soup.h"
 
 namespace {
 

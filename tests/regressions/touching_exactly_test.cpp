@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "rendering/renderer.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 
 namespace palpate {

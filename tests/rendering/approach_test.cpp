@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 
 #include "rendering/contact_detection.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/probe_paths.h"
 #include "tests/shared/random_mesh.h"

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <numbers>
 
+#include "stimuli/convex_mesh.h"
 #include "tests/shared/random_mesh.h"
 #include "tests/shared/render_checks.h"
 

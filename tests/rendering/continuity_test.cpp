@@ -15,6 +15,8 @@
 #include <glm/geometric.hpp>
 #include <numbers>
 
+#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/probe_paths.h"
 #include "tests/shared/random_mesh.h"

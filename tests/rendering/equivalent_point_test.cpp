@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "rendering/renderer.h"
+#include "stimuli/polygon_soup.h"
 #include "tests/shared/union_scenes.h"
 
 namespace palpate::rendering {

@@ -14,6 +14,8 @@
 #include "rendering/direction_maps.h"
 #include "rendering/near_pairs.h"
 #include "rendering/renderer.h"
+#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/probe_paths.h"
 #include "tests/shared/random_mesh.h"

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
 #include "tests/shared/random_mesh.h"
 #include "tests/shared/render_checks.h"
 

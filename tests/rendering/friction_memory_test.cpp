@@ -10,6 +10,7 @@
 
 #include "rendering/renderer.h"
 #include "rendering/scene.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::rendering {

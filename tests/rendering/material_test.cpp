@@ -10,6 +10,7 @@
 
 #include "data/base/random.h"
 #include "rendering/renderer.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/render_checks.h"
 

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "rendering/union_contact.h"
+#include "stimuli/polygon_soup.h"
 #include "tests/shared/random_clusters.h"
 
 namespace palpate::rendering {

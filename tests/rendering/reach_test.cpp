@@ -12,6 +12,7 @@
 
 #include "data/base/random.h"
 #include "rendering/renderer.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::rendering {

@@ -5,6 +5,7 @@
 #include <glm/common.hpp>
 
 #include "rendering/union_contact.h"
+#include "stimuli/polygon_soup.h"
 #include "tests/shared/union_scenes.h"
 
 namespace palpate::rendering {

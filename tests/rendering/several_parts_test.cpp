@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "runner/evidence/tick_meters.h"
+#include "stimuli/convex_mesh.h"
 #include "tests/shared/union_scenes.h"
 
 namespace palpate::rendering {

@@ -20,6 +20,7 @@
 #include "runner/evidence/verification/random_solids.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/orientation.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/random_polyhedron.h"
 #include "tests/shared/union_scenes.h"

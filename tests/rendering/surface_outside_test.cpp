@@ -17,6 +17,7 @@
 #include "rendering/surface.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/orientation.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "tests/rendering/winding_oracle.h"
 #include "tests/shared/probe_paths.h"

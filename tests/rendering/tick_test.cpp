@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "runner/evidence/tick_meters.h"
+#include "stimuli/convex_mesh.h"
 #include "tests/shared/random_mesh.h"
 #include "tests/shared/render_checks.h"
 

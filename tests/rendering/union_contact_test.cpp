@@ -10,6 +10,7 @@
 
 #include "rendering/union_state.h"
 #include "runner/evidence/tick_meters.h"
+#include "stimuli/polygon_soup.h"
 #include "tests/shared/union_scenes.h"
 
 namespace palpate::rendering {

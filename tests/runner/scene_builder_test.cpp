@@ -18,6 +18,7 @@
 #include "rendering/bodies/moving_scene.h"
 #include "rendering/render_fault.h"
 #include "rendering/union_contact.h"
+#include "stimuli/polygon_soup.h"
 #include "tests/shared/temporary_folder.h"
 
 namespace palpate::runner {

@@ -35,7 +35,7 @@ stimuli::ObjectSpec box(const Vec3& low, const Vec3& high) {
   return spec;
 }
 
-stimuli::ObjectSpec compound(std::vector<stimuli::ObjectSpec> parts) {
+stimuli::ObjectSpec compound_of(std::vector<stimuli::ObjectSpec> parts) {
   stimuli::ObjectSpec spec;
   spec.shape = stimuli::ShapeKind::compound;
   spec.material.stiffness = kStiffness;
@@ -73,7 +73,7 @@ class Tiles {
       return box(low, high);
     if (made_ == Made::compounds) {
       const double middle = 0.5 * (low.x + high.x);
-      return compound({box(low, {middle, high.y, high.z}), box({middle, low.y, low.z}, high)});
+      return compound_of({box(low, {middle, high.y, high.z}), box({middle, low.y, low.z}, high)});
     }
     return stepped(low, high);
   }
@@ -107,7 +107,7 @@ class Tiles {
 
   Made made_;
   int columns_, rows_;
-  testing::TemporaryFolder folder_;
+  palpate::testing::TemporaryFolder folder_;
 };
 
 /// A slide over the tiles, upright or tilted, pressing from above.

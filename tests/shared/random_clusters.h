@@ -7,6 +7,7 @@
 
 #include "data/base/random.h"
 #include "rendering/scene.h"
+#include "stimuli/polygon_soup.h"
 #include "tests/shared/probe_paths.h"
 #include "tests/shared/random_polyhedron.h"
 #include "tests/shared/union_scenes.h"

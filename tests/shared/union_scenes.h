@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "rendering/scene.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/random_mesh.h"
 #include "tests/shared/render_checks.h"

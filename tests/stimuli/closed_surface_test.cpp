@@ -17,6 +17,7 @@
 #include "stimuli/mesh_file.h"
 #include "stimuli/orientation.h"
 #include "stimuli/parts/cell.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/random_polyhedron.h"
 #include "tests/stimuli/concave_solids.h"

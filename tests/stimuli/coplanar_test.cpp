@@ -6,6 +6,8 @@
 
 #include <algorithm>
 
+#include "stimuli/mesh_names.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/random_polyhedron.h"
 

@@ -10,6 +10,7 @@
 
 #include "data/base/random.h"
 #include "stimuli/orientation.h"
+#include "stimuli/polygon_soup.h"
 #include "tests/shared/random_polyhedron.h"
 
 namespace palpate::stimuli {

@@ -17,8 +17,10 @@
 #include <vector>
 
 #include "data/base/random.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/grid_hull.h"
 #include "stimuli/orientation.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::stimuli {

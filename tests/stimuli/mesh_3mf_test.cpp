@@ -11,6 +11,7 @@
 #include "data/base/random.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/mesh_file.h"
+#include "stimuli/polygon_soup.h"
 #include "tests/shared/zip_file.h"
 
 namespace palpate::stimuli {

@@ -13,6 +13,8 @@
 #include <glm/common.hpp>
 #include <limits>
 
+#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/random_polyhedron.h"
 #include "tests/shared/temporary_folder.h"

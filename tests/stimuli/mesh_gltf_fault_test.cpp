@@ -5,9 +5,11 @@
 
 #include "data/base/random.h"
 #include "data/base/text.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/mesh_formats.h"
 #include "stimuli/parts/convex_parts.h"
+#include "stimuli/polygon_soup.h"
 #include "tests/stimuli/gltf_box.h"
 
 namespace palpate::stimuli {

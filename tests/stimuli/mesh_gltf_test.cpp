@@ -7,8 +7,10 @@
 #include <glm/geometric.hpp>
 #include <string>
 
+#include "stimuli/convex_mesh.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/parts/convex_parts.h"
+#include "stimuli/polygon_soup.h"
 #include "tests/shared/temporary_folder.h"
 #include "tests/stimuli/gltf_box.h"
 

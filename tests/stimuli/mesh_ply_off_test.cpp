@@ -6,6 +6,7 @@
 #include <string>
 
 #include "stimuli/mesh_file.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::stimuli {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "stimuli/parts/convex_parts.h"
+#include "stimuli/polygon_soup.h"
 #include "tests/stimuli/mesh_invariants.h"
 
 namespace palpate::stimuli::checks {

@@ -1,8 +1,8 @@
+#include "stimuli/plane_deviation.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
-
-#include "stimuli/convex_mesh.h"
 
 namespace palpate::stimuli {
 namespace {

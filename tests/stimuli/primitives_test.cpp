@@ -9,6 +9,9 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
+
 namespace palpate::stimuli {
 namespace {
 

@@ -5,6 +5,7 @@
 #include <set>
 #include <string>
 
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "stimuli/shapes.h"
 

@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/random_polyhedron.h"
 

@@ -15,6 +15,7 @@
 
 #include "rendering/probe.h"
 #include "rendering/renderer.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::rendering {

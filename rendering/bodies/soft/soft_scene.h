@@ -15,6 +15,7 @@
 #include "rendering/bodies/soft/soft_body.h"
 #include "rendering/scene.h"
 #include "rendering/tool.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/shapes.h"
 #include "stimuli/vec.h"
 

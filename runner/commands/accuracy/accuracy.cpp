@@ -16,6 +16,8 @@
 #include "runner/evidence/reports/accuracy_report.h"
 #include "runner/output/outputs.h"
 #include "runner/output/progress_line.h"
+#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::commands {

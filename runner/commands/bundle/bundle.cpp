@@ -19,12 +19,12 @@
 #include "data/store/store.h"
 #include "protocols/json_document.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/shared/protocol_choice.h"
 #include "runner/registration/about_file.h"
 #include "runner/registration/bundle_contents.h"
 #include "runner/registration/deviations.h"
 #include "runner/registration/registration.h"
 #include "runner/registration/sealed_folder.h"
+#include "runner/station/protocol_choice.h"
 #include "runner/study/export_settings.h"
 
 namespace palpate::runner::commands {

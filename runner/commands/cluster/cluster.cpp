@@ -37,7 +37,9 @@
 #include "runner/output/outputs.h"
 #include "runner/session/run_record.h"
 #include "runner/study/simulation_limits.h"
+#include "runner/sweep/cluster_folder.h"
 #include "runner/sweep/cluster_job.h"
+#include "runner/sweep/slurm.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -52,90 +54,6 @@ struct ShardState {
   bool done() const { return recorded >= wanted; }
 };
 
-struct Output {
-  int status = 0;
-  std::string text;  ///< stdout and stderr
-};
-
-Output run(const std::string& command) {
-  std::FILE* const pipe = ::popen((command + " 2>&1").c_str(), "re");
-  if (pipe == nullptr) throw std::runtime_error("a shell cannot be started");
-  Output out;
-  std::array<char, 4096> part{};
-  while (const std::size_t read = std::fread(part.data(), 1, part.size(), pipe))
-    out.text.append(part.data(), read);
-  const int status = ::pclose(pipe);
-  out.status = WIFEXITED(status) ? WEXITSTATUS(status) : 1;
-  while (!out.text.empty() && out.text.back() == '\n') out.text.pop_back();
-  return out;
-}
-
-// Slurm through its own commands, sbatch and squeue, without a library: works with any version.
-/// "1-64", "3,7,9-12": ascending numbers as --array takes them.
-std::string array_text(const std::vector<std::int64_t>& tasks) {
-  std::string out;
-  for (std::size_t i = 0; i < tasks.size();) {
-    std::size_t last = i;
-    while (last + 1 < tasks.size() && tasks[last + 1] == tasks[last] + 1) ++last;
-    out += (out.empty() ? "" : ",") + std::to_string(tasks[i]);
-    if (last > i) out += "-" + std::to_string(tasks[last]);
-    i = last + 1;
-  }
-  return out;
-}
-
-/// Runs sbatch with --parsable. \return the job's number. \throws std::runtime_error with sbatch's
-/// message, also if there is no sbatch
-std::string submit(const std::vector<std::string>& arguments) {
-  std::string command = "sbatch --parsable";
-  for (const std::string& argument : arguments) command += " " + shell_quoted(argument);
-  const Output said = run(command);
-  std::string job = said.text.substr(0, said.text.find(';'));  // "123;cluster"
-  const bool number = !job.empty() && std::all_of(job.begin(), job.end(),
-                                                  [](char c) { return c >= '0' && c <= '9'; });
-  if (said.status == 127)
-    throw std::runtime_error("there is no Slurm here (no command sbatch): " + said.text);
-  if (said.status != 0 || !number) throw std::runtime_error("sbatch refused the job: " + said.text);
-  return job;
-}
-
-/// States of the array's tasks in the queue, by number: PENDING, RUNNING, ... Empty if the job has
-/// ended. \throws std::runtime_error: no squeue, or it failed
-std::map<std::int64_t, std::string> queue_states(const std::string& job) {
-  const Output said = run("squeue --noheader --array --format='%K %T' --jobs=" + shell_quoted(job));
-  if (said.status == 127) throw std::runtime_error("there is no Slurm here (no command squeue)");
-  // squeue does not know a job that ended some minutes ago.
-  if (said.status != 0 && said.text.find("Invalid job id") != std::string::npos) return {};
-  if (said.status != 0) throw std::runtime_error("squeue failed: " + said.text);
-  std::map<std::int64_t, std::string> out;
-  std::istringstream lines(said.text);
-  std::string task, state;
-  while (lines >> task >> state) {
-    char* end = nullptr;
-    const long long number = std::strtoll(task.c_str(), &end, 10);
-    if (end != task.c_str() && *end == '\0') out[number] = state;
-  }
-  return out;
-}
-
-fs::path part_of(const fs::path& folder, const sweep::ClusterJob& job, std::int64_t shard) {
-  const std::string digits = std::to_string(shard);
-  return folder / "parts" /
-         ("part" + std::string(6 - std::min<std::size_t>(6, digits.size()), '0') + digits +
-          job.extension());
-}
-
-/// Units in a shard's file.
-std::int64_t recorded_in(const sweep::ClusterJob& job, const std::string& path) {
-  if (!fs::exists(path)) return 0;
-  if (job.work == "plan") return 1;  // written at once
-  if (job.work == "sweep") return data::SweepFile::open(path).count();
-  data::Store store = data::Store::open(path, data::Store::Mode::read_only);
-  const std::vector<data::StoredRun> runs = store.runs();
-  return std::count_if(runs.begin(), runs.end(),
-                       [](const data::StoredRun& run) { return run.end == data::RunEnd::done; });
-}
-
 /// \param text  after the first line, which names the shell
 void write_script(const fs::path& path, const std::string& text) {
   output::write_whole(path.string(), "#!/bin/bash\numask 077\n" + text);
@@ -148,54 +66,13 @@ std::int64_t seconds_since_1970() {
       .count();
 }
 
-/// Units in the merged file; 0: there is none yet. A plan has no such file and needs none.
-/// \throws data::StoreRefused
-std::int64_t merged_units(const fs::path& folder, const sweep::ClusterJob& job) {
-  if (job.work == "plan") return job.items;
-  return recorded_in(job, (folder / ("all" + std::string(job.extension()))).string());
-}
-
-/// Copies the inputs of the tasks, so that the originals may change while they run: the protocol
-/// with the files that it names, and others. \return paths of the copies of protocol and others, in
-/// order. \throws UsageError: the protocol names a file by an absolute path
-std::vector<std::string> copy_inputs(const fs::path& folder, const protocols::Protocol& protocol,
-                                     const std::vector<std::string>& others) {
-  const data::ProtocolInfo info = session::info_of(protocol);
-  std::ptrdiff_t up = 0;  // steps out of the protocol's folder
-  for (const data::ProtocolFile& file : info.files) {
-    const fs::path name = fs::path(file.name).lexically_normal();
-    if (name.is_absolute())
-      throw UsageError("the protocol names " + file.name +
-                       ", which is not copied for the tasks; name it relative to the protocol");
-    up = std::max(up, std::count(name.begin(), name.end(), fs::path("..")));
-  }
-  const fs::path inputs = folder / "inputs";
-  fs::path place = inputs;
-  for (; up > 0; --up) place /= "protocol";
-  fs::create_directories(place);
-  const auto put = [](const fs::path& path, const std::string& bytes) {
-    fs::create_directories(path.parent_path());
-    output::write_whole(path.string(), bytes);
-  };
-  put(place / "protocol.json", info.text);
-  for (const data::ProtocolFile& file : info.files)
-    put((place / file.name).lexically_normal(), file.bytes);
-  std::vector<std::string> out{(place / "protocol.json").string()};
-  for (std::size_t i = 0; i < others.size(); ++i) {
-    out.push_back(
-        others[i].empty() ? "" : (inputs / ("other" + std::to_string(i + 1) + ".json")).string());
-    if (!others[i].empty()) put(out.back(), protocols::read_text_file(others[i]));
-  }
-  return out;
-}
-
 /// By shard, from 1, read from its file. \throws data::StoreRefused
 std::vector<ShardState> shard_states(const fs::path& folder, const sweep::ClusterJob& job) {
   std::vector<ShardState> out;
   for (std::int64_t number = 1; number <= job.shards; ++number) {
     const Shard shard{number, job.shards};
     out.push_back({(shard.last(job.items) - shard.first(job.items)) * job.per_item,
-                   recorded_in(job, part_of(folder, job, number).string())});
+                   sweep::recorded_in(job, sweep::part_of(folder, job, number).string())});
   }
   return out;
 }
@@ -206,32 +83,10 @@ std::int64_t recorded_units(const std::vector<ShardState>& states) {
   return sum;
 }
 
-void require_own_scripts(const fs::path& folder) {
-  std::vector<fs::path> all{folder,
-                            folder / "parts",
-                            folder / "logs",
-                            folder / "cluster.json",
-                            folder / "shard.sh",
-                            folder / "finish.sh"};
-  if (const fs::path inputs = folder / "inputs"; fs::exists(inputs)) {
-    all.push_back(inputs);
-    for (const auto& entry : fs::recursive_directory_iterator(inputs)) all.push_back(entry.path());
-  }
-  for (const fs::path& path : all) {
-    const std::string fault = data::ownership_fault(path.string());
-    if (fault.empty()) continue;
-    throw UsageError(
-        path.string() + ": " + fault +
-        "; another user's files there would run under your account. If nothing was changed: "
-        "chmod -R go-w " +
-        shell_quoted(folder.string()));
-  }
-}
-
 /// Submits the unfinished shards as an array job, followed by the merging job; reports on stdout.
 /// \throws std::runtime_error with sbatch's message
 void submit_shards(const fs::path& folder, sweep::ClusterJob& job) {
-  require_own_scripts(folder);
+  sweep::require_own_scripts(folder);
   const std::vector<ShardState> states = shard_states(folder, job);
   std::vector<std::int64_t> todo;
   for (std::size_t i = 0; i < states.size(); ++i) {
@@ -243,9 +98,9 @@ void submit_shards(const fs::path& folder, sweep::ClusterJob& job) {
   if (!todo.empty()) {
     std::vector<std::string> array = arguments;
     array.insert(array.end(), {"--job-name=palpate", "--requeue", "--open-mode=append",
-                               "--output=logs/shard-%a.log", "--array=" + array_text(todo),
+                               "--output=logs/shard-%a.log", "--array=" + sweep::array_text(todo),
                                (folder / "shard.sh").string()});
-    job.array_job = submit(array);
+    job.array_job = sweep::submit(array);
     job.submitted_s = seconds_since_1970();
     job.done_then = recorded_units(states);
     sweep::write_job(folder, job);
@@ -255,9 +110,9 @@ void submit_shards(const fs::path& folder, sweep::ClusterJob& job) {
   }
   finish.insert(finish.end(), {"--job-name=palpate-finish", "--requeue", "--output=logs/finish.log",
                                (folder / "finish.sh").string()});
-  const std::string last = submit(finish);
+  const std::string last = sweep::submit(finish);
   if (!todo.empty())
-    std::cout << "job " << job.array_job << ": shards " << array_text(todo) << "\n";
+    std::cout << "job " << job.array_job << ": shards " << sweep::array_text(todo) << "\n";
   std::cout << "job " << last << ": merges and analyses when they are done\n";
 }
 
@@ -400,7 +255,7 @@ int begin(const ClusterSettings& settings, sweep::ClusterJob job,
   }
   const fs::path folder = make_folder(settings);
   job.shards = settings.shards;
-  write_scripts(folder, job, command(copy_inputs(folder, protocol, others)));
+  write_scripts(folder, job, command(sweep::copy_inputs(folder, protocol, others)));
   const double items = static_cast<double>(job.items) / static_cast<double>(job.shards);
   warn_of_small_shards(
       std::to_string(std::lround(items)) + (job.work == "sweep" ? " points" : " participants"),
@@ -466,7 +321,7 @@ int begin_study(const ClusterSettings& settings, const StudyOptions& study) {
 int cluster_submit(const std::string& given) {
   const fs::path folder = fs::absolute(given).lexically_normal();
   sweep::ClusterJob job = sweep::read_job(folder);
-  if (!job.array_job.empty() && !queue_states(job.array_job).empty()) {
+  if (!job.array_job.empty() && !sweep::queue_states(job.array_job).empty()) {
     throw UsageError("job " + job.array_job +
                      " is still in the queue; wait for its end, or: scancel " + job.array_job);
   }
@@ -481,7 +336,7 @@ int cluster_status(const std::string& given) {
   std::map<std::int64_t, std::string> queue;
   if (!job.array_job.empty()) {
     try {
-      queue = queue_states(job.array_job);
+      queue = sweep::queue_states(job.array_job);
     } catch (const std::runtime_error& error) {
       std::cerr << error.what() << "; what follows is from the files alone\n";
     }
@@ -515,7 +370,7 @@ int cluster_status(const std::string& given) {
               << " min, at the pace since it was submitted\n";
   }
   if (!stopped.empty() && !job.array_job.empty()) {
-    std::cout << "not done: shards " << array_text(stopped)
+    std::cout << "not done: shards " << sweep::array_text(stopped)
               << "; logs/shard-K.log says why; resume them with: palpate cluster submit "
               << printable(given) << "\n";
   }
@@ -524,7 +379,7 @@ int cluster_status(const std::string& given) {
     const std::string merged = plan ? "" : std::string("all") + job.extension() + ", ";
     const std::string last = plan ? "power.svg" : "report.html";
     std::cout << "result: "
-              << (fs::exists(folder / last) && merged_units(folder, job) >= all
+              << (fs::exists(folder / last) && sweep::merged_units(folder, job) >= all
                       ? merged + "analysis.txt, analysis.json, " + last
                       : "not merged yet; logs/finish.log, or by hand: finish.sh")
               << "\n";

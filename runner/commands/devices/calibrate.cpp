@@ -46,7 +46,7 @@ class TerminalGuide final : public Guide {
       if (letter == '\n') {
         const bool stop = line_ == "q" || line_ == "Q";
         line_.clear();
-        return stop ? Answer::stop : Answer::go_on;
+        return stop ? Answer::stop : Answer::proceed;
       }
       if (line_.size() < 16) line_ += letter;
     }

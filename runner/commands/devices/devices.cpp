@@ -26,7 +26,6 @@
 #include "data/base/text.h"
 #include "data/files/atomic_file.h"
 #include "data/files/utc.h"
-#include "runner/commands/run/opening.h"
 #include "runner/commands/shared/command.h"
 #include "runner/devices/device_delay.h"
 #include "runner/devices/registry.h"
@@ -37,6 +36,8 @@
 #include "runner/servo/realtime.h"
 #include "runner/servo/servo_thread.h"
 #include "runner/session/markers.h"
+#include "runner/station/opening.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::commands {
@@ -848,7 +849,7 @@ int devices_command(const std::vector<std::string>& args) {
   }
   const bool named = values->count("device") > 0;
   const std::string name = named ? (*values)["device"].as<std::string>() : "";
-  const devices::DeviceKind* const only = named ? &find_device_kind(name) : nullptr;
+  const devices::DeviceKind* const only = named ? &station::find_device_kind(name) : nullptr;
   if (values->count("calibrate") > 0) {
     if (!named) throw UsageError("--calibrate: name the device with --device");
     return calibrate_devices(*only, config, *values);

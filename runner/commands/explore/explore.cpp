@@ -18,7 +18,7 @@
 #include "data/files/file_permissions.h"
 #include "protocols/parse.h"
 #include "rendering/renderer.h"
-#include "runner/commands/explore/live_touch.h"
+#include "runner/commands/run/settings.h"
 #include "runner/commands/shared/command.h"
 #include "runner/display/scene/painter.h"
 #include "runner/display/scene/scene_drawing.h"
@@ -27,7 +27,9 @@
 #include "runner/safety/fault_signals.h"
 #include "runner/scene_builder.h"
 #include "runner/touch/forces.h"
+#include "runner/touch/live_touch.h"
 #include "runner/touch/scene_notes.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::runner::commands {
 namespace {
@@ -121,7 +123,7 @@ TouchedScene touch(const rendering::Scene& scene, const protocols::SceneSpec& sp
         for (const servo::ContactPlace& contact : display::contact_places(scene, state, rendering))
           out.strongest = std::max(out.strongest, glm::length(contact.force));
         if (!shown) return;
-        const display::SceneMoment moment = moment_of(pose, spec, scene, rendering, state);
+        const display::SceneMoment moment = touch::moment_of(pose, spec, scene, rendering, state);
         out.most_torque = std::max(out.most_torque, glm::length(display::torque_on_hand(moment)));
         // A path with gaps shows a row more than once.
         for (; next < rows.size() && rows[next] == row - 1; ++next) out.moments.push_back(moment);
@@ -330,7 +332,7 @@ ViewAngles parse_view(const std::string& text) {
 
 namespace po = boost::program_options;
 
-void add_explore_options(CommandLine& line, RunSettings& device) {
+void add_explore_options(CommandLine& line, station::RunSettings& device) {
   line.positional_names = {"SCENE.json"};
   line.options.add_options()  //
       ("device", po::value<std::string>()->value_name("NAME"),
@@ -395,18 +397,18 @@ int draw_pictures(const po::variables_map& values, const rendering::Renderer& re
 }
 
 int open_window(const po::variables_map& values, const rendering::Renderer& renderer,
-                const RunSettings& device) {
-  HandsOnSettings settings{.scene_path = text_of(values, "SCENE.json"),
-                           .trajectory = text_of(values, "trajectory"),
-                           .pictures = text_of(values, "pictures"),
-                           .labels = values["labels"].as<bool>(),
-                           .run = device};
+                const station::RunSettings& device) {
+  touch::HandsOnSettings settings{.scene_path = text_of(values, "SCENE.json"),
+                                  .trajectory = text_of(values, "trajectory"),
+                                  .pictures = text_of(values, "pictures"),
+                                  .labels = values["labels"].as<bool>(),
+                                  .run = device};
   settings.run.device = text_of(values, "device");
   check_recorders(settings.run);
   if (!settings.trajectory.empty() && !settings.run.device.empty())
     throw UsageError("--device and --trajectory: expected one of them");
   if (settings.trajectory.empty() && settings.run.device.empty()) settings.run.device = "mouse";
-  return explore_hands_on(protocols::parse_scene(settings.scene_path), renderer, settings);
+  return touch::explore_hands_on(protocols::parse_scene(settings.scene_path), renderer, settings);
 }
 
 }  // namespace
@@ -433,7 +435,7 @@ int explore_command(const std::vector<std::string>& args) {
       "  palpate explore protocols/scenes/fig17a-engine.json \\\n"
       "      --trajectory protocols/scenes/fig17a-engine.csv --frames engine --every 100ms\n"
       "  palpate explore scene.json --trajectory path.csv --animation scene.webp --size 640x360\n";
-  RunSettings device;
+  station::RunSettings device;
   add_explore_options(line, device);
   const auto values = line.parse(args);
   if (!values) return 0;

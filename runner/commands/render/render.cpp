@@ -20,6 +20,7 @@
 #include "runner/output/outputs.h"
 #include "runner/touch/forces.h"
 #include "runner/touch/scene_notes.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/parts/convex_parts.h"
 
 namespace palpate::runner::commands {

@@ -21,8 +21,6 @@
 #include "protocols/session_plan.h"
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/texts.h"
-#include "runner/commands/run/admission.h"
-#include "runner/commands/run/opening.h"
 #include "runner/commands/run/settings.h"
 #include "runner/commands/shared/command.h"
 #include "runner/safety/fault_signals.h"
@@ -34,6 +32,8 @@
 #include "runner/session/sample_stream.h"
 #include "runner/session/socket_advisor.h"
 #include "runner/session/station.h"
+#include "runner/station/admission.h"
+#include "runner/station/opening.h"
 
 namespace palpate::runner::commands {
 
@@ -96,8 +96,8 @@ namespace {
 
 /// Facts known before the session, for its record or the console.
 struct Beforehand {
-  const RunSettings& settings;
-  const Admission& admission;
+  const station::RunSettings& settings;
+  const station::Admission& admission;
   const std::vector<session::LimitedMaterial>& limited;
   const data::SessionProgress& progress;  ///< what is on record of this session
   std::int64_t servo_began_ns;            ///< session clock
@@ -170,7 +170,8 @@ void tell(session::LiveSession& session, const session::LiveStation& station,
     session.say("WITHOUT the protocol's sounds");
   if (station.protocol.masking_noise && station.noise == nullptr)
     session.say("WITHOUT the protocol's masking noise");
-  for (const std::string& note : notes_on_outlets(known.settings, station.protocol, station.noise))
+  for (const std::string& note :
+       station::notes_on_outlets(known.settings, station.protocol, station.noise))
     record.note(began_ns, note);
   const std::string& missing = station.servo_thread.rights().missing;
   if (!missing.empty()) session.say(missing);
@@ -245,7 +246,7 @@ std::vector<std::string> news(const std::string& resumed, const display::Display
   return out;
 }
 
-participants::AnswerBy answer_by(const RunSettings& settings) {
+participants::AnswerBy answer_by(const station::RunSettings& settings) {
   if (settings.spoken) return participants::AnswerBy::experimenter;
   return settings.buttons ? participants::AnswerBy::buttons : participants::AnswerBy::keys;
 }
@@ -256,12 +257,12 @@ bool asks_for_consent(const protocols::Protocol& protocol) {
   });
 }
 
-bool has_joystick(const RunSettings& settings, const protocols::Protocol& protocol) {
+bool has_joystick(const station::RunSettings& settings, const protocols::Protocol& protocol) {
   return !protocol.responses.joystick.empty() && !settings.no_window;
 }
 
 /// Replaces the texts by a translation; the shown texts are recorded whole.
-void translate_texts(const RunSettings& settings, Admission& admission) {
+void translate_texts(const station::RunSettings& settings, station::Admission& admission) {
   protocols::Protocol& protocol = admission.protocol;
   if (has_joystick(settings, protocol) != !protocol.responses.joystick.empty())
     admission.warnings.emplace_back("a gamepad or pedal is looked at in a window only");
@@ -277,14 +278,14 @@ void translate_texts(const RunSettings& settings, Admission& admission) {
 }  // namespace
 
 int run_command(const std::vector<std::string>& args) {
-  std::optional<RunSettings> given = parse_run_settings(args);
+  std::optional<station::RunSettings> given = parse_run_settings(args);
   if (!given) return 0;
-  RunSettings& settings = *given;
+  station::RunSettings& settings = *given;
   std::signal(SIGPIPE, SIG_IGN);  // a closed reader must not end a session
 
   // Who takes part, in which protocol.
-  const devices::DeviceKind& kind = find_device_kind(settings.device);
-  Admission admission = admit(settings);
+  const devices::DeviceKind& kind = station::find_device_kind(settings.device);
+  station::Admission admission = station::admit(settings);
   if (protocols::is_external(admission.protocol))
     throw UsageError(
         "this protocol has a block of the task 'external': palpate serve runs it, with the program "
@@ -294,18 +295,18 @@ int run_command(const std::vector<std::string>& args) {
   translate_texts(settings, admission);
 
   // The device behind its watchdog, which is forked before markers and noise start their threads.
-  auto marker_sinks = open_markers(settings);
+  auto marker_sinks = station::open_markers(settings);
   safety::FaultSignals signals;
-  const OpenDevice open = open_device(kind, settings, protocol);
+  const station::OpenDevice open = station::open_device(kind, settings, protocol);
   const ZeroOnSignal guard_on_signal(signals, open.guard);
   session::Markers markers(std::move(marker_sinks), protocols::event_codes(protocol),
                            settings.sync);
-  const auto stream = open_stream(settings, protocol.servo_rate);
+  const auto stream = station::open_stream(settings, protocol.servo_rate);
   const servo::DeviceCapabilities& device = open.device->capabilities();
   const std::vector<session::LimitedMaterial> limited = session::limit_materials(protocol, device);
   const StimulusLibrary library(protocol);
-  check_fitness(open, settings, protocol, library);
-  const auto noise = open_noise(settings, protocol);
+  station::check_fitness(open, settings, protocol, library);
+  const auto noise = station::open_noise(settings, protocol);
 
   // The record. Data from a simulated device is labelled simulated, whoever answers.
   data::Store store = data::Store::open(settings.database, data::Store::Mode::write_or_create);
@@ -313,13 +314,13 @@ int run_command(const std::vector<std::string>& args) {
   servo::RealClock clock;
   const data::Participant participant =
       store.look_up(admission.enrolled, settings.participant, admission.number, device.simulated);
-  const int session = choose_session(store, participant, protocol, settings);
+  const int session = station::choose_session(store, participant, protocol, settings);
   print_participant(participant, session, protocol.sessions.count, device.simulated);
   if (settings.consent.empty() && !asks_for_consent(protocol))
     std::fprintf(stderr, "no consent is recorded (--consent VERSION)\n");
 
   // The servo loop, without forces until the first trial; the displays, each of which can end them.
-  const servo::ServoSettings servo_settings = servo_settings_of(protocol);
+  const servo::ServoSettings servo_settings = station::servo_settings_of(protocol);
   const session::ForceDirectionCheck direction_check(limits_of(servo_settings, device),
                                                      device.actuated_freedom);
   const std::int64_t servo_began_ns = clock.now_ns();
@@ -329,23 +330,24 @@ int run_command(const std::vector<std::string>& args) {
     if (guard != nullptr) guard->emergency_zero();
     servo.emergency_zero();
   };
-  const auto display = open_display(settings, protocol, store, clock, *open.device, emergency);
-  const auto box = open_response_box(settings, protocol, clock, emergency);
+  const auto display =
+      station::open_display(settings, protocol, store, clock, *open.device, emergency);
+  const auto box = station::open_response_box(settings, protocol, clock, emergency);
   std::optional<participants::ScreenWithBox> box_screen;
   if (box) box_screen.emplace(display->participant(), *box);
   display::ParticipantScreen& screen =
       box_screen ? static_cast<display::ParticipantScreen&>(*box_screen) : display->participant();
 
-  const data::ClockStamp began = stamp_now(clock);
+  const data::ClockStamp began = station::stamp_now(clock);
   session::RunRecord record(
       store, admission.enrolled, participant,
-      run_info(settings, device, session, began, has_joystick(settings, protocol)),
-      other_texts(admission));
+      station::run_info(settings, device, session, began, has_joystick(settings, protocol)),
+      station::other_texts(admission));
   const data::SessionProgress progress = store.progress(participant, session);
   protocols::SessionPlan plan(protocol, participant.enrolled_number, session);
   for (const data::TrialRecord& trial : progress.completed)
     plan.answered(session::outcome_of(trial));
-  const std::string resumed = resumption(store, participant, session, plan);
+  const std::string resumed = station::resumption(store, participant, session, plan);
 
   std::optional<session::SocketAdvisor> advisor;
   if (!settings.advisor.empty())
@@ -377,7 +379,7 @@ int run_command(const std::vector<std::string>& args) {
       station,
       store.look_up(admission.enrolled, participant.code, std::nullopt, participant.simulated),
       outcome);
-  print_dropped(markers, stream.get());
+  station::print_dropped(markers, stream.get());
   return outcome.failed ? 1 : 0;
 }
 

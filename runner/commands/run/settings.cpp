@@ -11,7 +11,7 @@ namespace palpate::runner::commands {
 
 namespace po = boost::program_options;
 
-void add_device_options(po::options_description& options, RunSettings& settings) {
+void add_device_options(po::options_description& options, station::RunSettings& settings) {
   options.add_options()  //
       ("serial", po::value(&settings.serials)->composing()->value_name("NUMBER"),
        "which device; two of a stylus: twice, tip first")  //
@@ -27,7 +27,7 @@ void add_device_options(po::options_description& options, RunSettings& settings)
        "run although the calibration is missing or stale");
 }
 
-void add_recorder_options(po::options_description& options, RunSettings& settings) {
+void add_recorder_options(po::options_description& options, station::RunSettings& settings) {
   options.add_options()  //
       ("markers", po::value(&settings.markers)->composing()->value_name("WHERE"),
        "udp:HOST:PORT, serial:PATH[:BAUD[:PULSE_MS]], parport:PATH[:PULSE_MS] or lsl[:NAME]; may "
@@ -44,7 +44,7 @@ void add_recorder_options(po::options_description& options, RunSettings& setting
        "in clear; without it participant_id is null there");
 }
 
-void add_sound_options(po::options_description& options, RunSettings& settings) {
+void add_sound_options(po::options_description& options, station::RunSettings& settings) {
   options.add_options()  //
       ("sound-device",
        po::value(&settings.sound_device)->default_value("default")->value_name("NAME"),
@@ -53,7 +53,7 @@ void add_sound_options(po::options_description& options, RunSettings& settings) 
        "run without the protocol's masking noise and sounds");
 }
 
-void check_recorders(const RunSettings& settings) {
+void check_recorders(const station::RunSettings& settings) {
   if (settings.sync && settings.markers.empty())
     throw UsageError("--sync: name a receiver with --markers");
 }
@@ -70,7 +70,7 @@ void check_language(const std::string& language) {
     throw UsageError("--language: must be letters, digits, - and _, such as de or pt-BR");
 }
 
-void check(RunSettings& settings) {
+void check(station::RunSettings& settings) {
   settings.participant = given_or_asked(settings.participant, "participant code");
   if (!data::is_participant_code(settings.participant))
     throw UsageError("--participant: must be a pseudonym of 1 to 32 letters and digits");
@@ -95,7 +95,7 @@ void check(RunSettings& settings) {
 
 }  // namespace
 
-std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& args) {
+std::optional<station::RunSettings> parse_run_settings(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage = "palpate run PROTOCOL.json --db FILE --participant CODE [--number N] --device NAME";
   line.summary =
@@ -109,7 +109,7 @@ std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& ar
   palpate run protocols/quick.json --db try.db --participant T1 --device mouse
   palpate run protocols/quick.json --db try.db --participant T2 --device simulated --no-window
 )";
-  RunSettings settings;
+  station::RunSettings settings;
   int number = 0, session = 0;
   double latency = 0, scale = 0;
   line.options.add_options()  //

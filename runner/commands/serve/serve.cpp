@@ -13,8 +13,7 @@
 #include "data/store/store.h"
 #include "protocols/json_document.h"
 #include "protocols/session_plan.h"
-#include "runner/commands/run/admission.h"
-#include "runner/commands/run/opening.h"
+#include "runner/commands/run/settings.h"
 #include "runner/commands/shared/command.h"
 #include "runner/safety/fault_signals.h"
 #include "runner/serve/network.h"
@@ -23,6 +22,8 @@
 #include "runner/servo/realtime.h"
 #include "runner/session/device_check.h"
 #include "runner/session/recorded_outcome.h"
+#include "runner/station/admission.h"
+#include "runner/station/opening.h"
 #include "runner/touch/forces.h"
 #include "runner/touch/trial_page.h"
 
@@ -208,7 +209,7 @@ class Server final : public serve::ServeOutput {
   std::optional<TokenFile> token_file_;
 };
 
-void tell_of_servo(const servo::ServoThread& servo) {
+void report_servo(const servo::ServoThread& servo) {
   const servo::ServoHealth& health = servo.health();
   std::cerr << "palpate serve ends: " << health.ticks() << " ticks, " << health.missed_ticks()
             << " missed\n";
@@ -220,9 +221,10 @@ constexpr std::int64_t kNap_ns = 2'000'000;  // between two looks at the servo's
 struct Recorders {
   /// \param sinks  opened before the device's watchdog is forked. \param rate  Hz, of the servo
   Recorders(std::vector<std::unique_ptr<session::MarkerSink>> sinks,
-            const protocols::EventCodes& codes, const RunSettings& settings, double rate)
-      : markers(std::move(sinks), codes, settings.sync), stream(open_stream(settings, rate)) {}
-  ~Recorders() { print_dropped(markers, stream.get()); }
+            const protocols::EventCodes& codes, const station::RunSettings& settings, double rate)
+      : markers(std::move(sinks), codes, settings.sync),
+        stream(station::open_stream(settings, rate)) {}
+  ~Recorders() { station::print_dropped(markers, stream.get()); }
   Recorders(const Recorders&) = delete;
   Recorders& operator=(const Recorders&) = delete;
 
@@ -230,8 +232,8 @@ struct Recorders {
   std::unique_ptr<session::SampleStream> stream;
 };
 
-int serve_scene(const po::variables_map& values, const RunSettings& run) {
-  const devices::DeviceKind& kind = find_device_kind(run.device);
+int serve_scene(const po::variables_map& values, const station::RunSettings& run) {
+  const devices::DeviceKind& kind = station::find_device_kind(run.device);
   const std::string path = text_of(values, "scene");
   protocols::SceneSpec spec;
   std::string text;
@@ -243,14 +245,15 @@ int serve_scene(const po::variables_map& values, const RunSettings& run) {
   if (!(rate >= 100 && rate <= 4000))
     throw UsageError("--rate: expected a number from 100 to 4000");
 
-  auto sinks = open_markers(run);
+  auto sinks = station::open_markers(run);
   safety::FaultSignals signals;
   protocols::Protocol protocol = serve::protocol_of(spec, touch::renderer_named("point"));
   protocol.servo_rate = rate;
-  const OpenDevice open = open_device(kind, run, protocol);  // forks: before there are threads
+  const station::OpenDevice open =
+      station::open_device(kind, run, protocol);  // forks: before there are threads
   signals.watch(open.guard);
   Recorders recorders(std::move(sinks), protocols::usual_event_codes(), run, rate);
-  if (open.guard != nullptr) check_fitness(open, run, protocol, StimulusLibrary(protocol));
+  if (open.guard != nullptr) station::check_fitness(open, run, protocol, StimulusLibrary(protocol));
   servo::RealClock clock;
   servo::ServoSettings servo;
   servo.rate = protocol.servo_rate;
@@ -283,57 +286,60 @@ int serve_scene(const po::variables_map& values, const RunSettings& run) {
     return 1;
   }
   scene.emergency_zero();
-  tell_of_servo(scene.servo());
+  report_servo(scene.servo());
   return 0;
 }
 
-int serve_session(const RunSettings& settings, const po::variables_map& values) {
-  const devices::DeviceKind& kind = find_device_kind(settings.device);
-  const Admission admission = admit(settings);
+int serve_session(const station::RunSettings& settings, const po::variables_map& values) {
+  const devices::DeviceKind& kind = station::find_device_kind(settings.device);
+  const station::Admission admission = station::admit(settings);
   protocols::Protocol protocol = admission.protocol;
   if (const std::string why = serve::unserved(protocol); !why.empty())
     throw UsageError("--protocol: " + why);
 
-  auto sinks = open_markers(settings);
+  auto sinks = station::open_markers(settings);
   safety::FaultSignals signals;
-  const OpenDevice open = open_device(kind, settings, protocol);  // forks: before there are threads
+  const station::OpenDevice open =
+      station::open_device(kind, settings, protocol);  // forks: before there are threads
   signals.watch(open.guard);
   const servo::DeviceCapabilities& device = open.device->capabilities();
   const std::vector<session::LimitedMaterial> limited = session::limit_materials(protocol, device);
   const StimulusLibrary library(protocol);
-  check_fitness(open, settings, protocol, library);
+  station::check_fitness(open, settings, protocol, library);
   Recorders recorders(std::move(sinks), protocols::event_codes(protocol), settings,
                       protocol.servo_rate);
-  const auto noise = open_noise(settings, protocol);
+  const auto noise = station::open_noise(settings, protocol);
 
   data::Store store = data::Store::open(settings.database, data::Store::Mode::write_or_create);
   warn_of_exposure(store.path());
   servo::RealClock clock;
   const data::Participant participant =
       store.look_up(admission.enrolled, admission.participant, admission.number, device.simulated);
-  const int session = choose_session(store, participant, protocol, settings);
+  const int session = station::choose_session(store, participant, protocol, settings);
   // Standard output is the program's.
   std::cerr << "participant " << participant.code << ", session " << session << "\n";
-  const data::ClockStamp began = stamp_now(clock);
-  data::RunInfo info = run_info(settings, device, session, began, false);
+  const data::ClockStamp began = station::stamp_now(clock);
+  data::RunInfo info = station::run_info(settings, device, session, began, false);
   info.response_device = "another program";
-  session::RunRecord record(store, admission.enrolled, participant, info, other_texts(admission));
+  session::RunRecord record(store, admission.enrolled, participant, info,
+                            station::other_texts(admission));
   const data::SessionProgress progress = store.progress(participant, session);
   protocols::SessionPlan plan(protocol, participant.enrolled_number, session);
   for (const data::TrialRecord& trial : progress.completed)
     plan.answered(session::outcome_of(trial));
-  if (const std::string resumed = resumption(store, participant, session, plan); !resumed.empty())
+  if (const std::string resumed = station::resumption(store, participant, session, plan);
+      !resumed.empty())
     std::cerr << resumed << "\n";
 
   record.note(clock.now_ns(), R"({"served":{"preflight":"left out"}})");
   if (noise == nullptr && (protocol.masking_noise || protocol.sounds))
     std::cerr << "WITHOUT the protocol's masking noise and sounds\n";
-  for (const std::string& note : notes_on_outlets(settings, protocol, noise.get()))
+  for (const std::string& note : station::notes_on_outlets(settings, protocol, noise.get()))
     record.note(clock.now_ns(), note);
   for (const std::string& note : admission.notes) record.note(clock.now_ns(), note);
   if (!limited.empty())
     record.note(clock.now_ns(), session::to_json_text(limited, device, protocol.servo_rate));
-  servo::ServoThread servo(*open.device, clock, servo_settings_of(protocol));
+  servo::ServoThread servo(*open.device, clock, station::servo_settings_of(protocol));
   std::optional<session::StreamedServo> streamed;
   if (recorders.stream) streamed.emplace(servo, *recorders.stream);
   servo::TickSource& ticks = streamed ? static_cast<servo::TickSource&>(*streamed) : servo;
@@ -352,12 +358,12 @@ int serve_session(const RunSettings& settings, const po::variables_map& values) 
   const serve::ServedSession::Outcome outcome =
       served.run(server, [&server] { return server.commands(); });
   served.emergency_zero();
-  tell_of_servo(servo);
+  report_servo(servo);
   if (!outcome.reason.empty()) std::cerr << outcome.reason << "\n";
   return outcome.failed ? 1 : 0;
 }
 
-int serve(const po::variables_map& values, RunSettings run) {
+int serve(const po::variables_map& values, station::RunSettings run) {
   run.device = text_of(values, "device");
   check_recorders(run);
   const int port = values["port"].as<int>();
@@ -433,7 +439,7 @@ int serve_command(const std::vector<std::string>& args) {
        "pages from there may connect; repeatable")  //
       ("rate", po::value<double>()->value_name("HZ")->default_value(1000, "1000"),
        "of the servo; with --protocol the protocol's");
-  RunSettings settings;
+  station::RunSettings settings;
   add_device_options(line.options, settings);
   add_recorder_options(line.options, settings);
   add_sound_options(line.options, settings);

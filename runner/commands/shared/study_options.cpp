@@ -121,7 +121,7 @@ void check_participant_version(const boost::program_options::variables_map& valu
     throw UsageError("--participant-version: must be 1 to " + std::to_string(versions.back()));
 }
 
-int version_to_go_on_with(const std::set<int>& begun, const std::string& file) {
+int version_to_resume_with(const std::set<int>& begun, const std::string& file) {
   if (begun.empty()) return participants::kDefaultParticipantVersion;
   if (begun.size() > 1) {
     std::string versions;

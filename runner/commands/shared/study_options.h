@@ -53,6 +53,6 @@ void add_participant_version(CommandLine& line, int& version);
 void check_participant_version(const boost::program_options::variables_map& values, int version);
 /// The version for a file without an option: the only one in `begun`, the default if that is empty.
 /// \throws UsageError naming `file`: it has several
-int version_to_go_on_with(const std::set<int>& begun, const std::string& file);
+int version_to_resume_with(const std::set<int>& begun, const std::string& file);
 
 }  // namespace palpate::runner::commands

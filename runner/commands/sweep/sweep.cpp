@@ -214,7 +214,7 @@ int version_begun_with(const std::string& database) {
         begun.insert(version);
     }
   }
-  return version_to_go_on_with(begun, database);
+  return version_to_resume_with(begun, database);
 }
 
 void print_summary(data::SweepFile& file, const data::SweepPlan& plan, const std::string& name) {

@@ -317,7 +317,7 @@ class WeighingProcedure {
   bool answered() {
     const Guide::Answer answer = guide_.answer();
     if (answer == Guide::Answer::stop) throw GuideError("stopped; nothing was stored");
-    return answer == Guide::Answer::go_on;
+    return answer == Guide::Answer::proceed;
   }
 
   servo::Device& device_;

@@ -23,7 +23,7 @@ class Guide {
   virtual void say(const std::string& text) = 0;
   /// Shows a request, to be confirmed with ENTER.
   virtual void ask(const std::string& text) = 0;
-  enum class Answer : std::uint8_t { none, go_on, stop };
+  enum class Answer : std::uint8_t { none, proceed, stop };
   /// The answer to the last request, if there is one yet; never blocks.
   virtual Answer answer() = 0;
 };

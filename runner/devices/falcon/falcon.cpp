@@ -126,6 +126,26 @@ void show_progress(const std::string& serial, const BootProgress& progress) {
             << (progress.sent == progress.size ? "\n" : "") << std::flush;
 }
 
+/// The driver of one Falcon, with the calibrated scale of force if there is a plausible one. Shows
+/// the progress of an upload on a terminal. \throws TransportError, InputError.
+std::unique_ptr<FalconDriver> open_driver(const std::string& serial, const std::string& firmware,
+                                          const Calibration& calibration) {
+  const auto image = image_in(firmware);  // read first: report a bad file before opening the device
+  auto line = open_usb(serial);
+  const std::string name = line->serial();
+  DriverSettings settings;
+  settings.boot = [image, name](Transport& transport) {
+    boot(transport, image ? &*image : nullptr, {},
+         [&name](const BootProgress& progress) { show_progress(name, progress); });
+  };
+  settings.boot(*line);
+  const ForceCalibration* force = calibration.force_of(name);
+  if (force != nullptr && plausible(*force)) {
+    settings.counts_per_torque = force->counts_per_torque;
+  }
+  return std::make_unique<FalconDriver>(std::move(line), settings);
+}
+
 }  // namespace
 
 Vec3 thigh_angles(const Vec3& counts) { return kZeroAngle + kCountAngle * counts; }
@@ -477,24 +497,6 @@ std::vector<servo::ConnectedDevice> connected_falcons(const servo::DeviceConfig&
     connected.push_back({std::move(listing.serial), std::move(listing.trouble)});
   }
   return connected;
-}
-
-std::unique_ptr<FalconDriver> open_driver(const std::string& serial, const std::string& firmware,
-                                          const Calibration& calibration) {
-  const auto image = image_in(firmware);  // read first: report a bad file before opening the device
-  auto line = open_usb(serial);
-  const std::string name = line->serial();
-  DriverSettings settings;
-  settings.boot = [image, name](Transport& transport) {
-    boot(transport, image ? &*image : nullptr, {},
-         [&name](const BootProgress& progress) { show_progress(name, progress); });
-  };
-  settings.boot(*line);
-  const ForceCalibration* force = calibration.force_of(name);
-  if (force != nullptr && plausible(*force)) {
-    settings.counts_per_torque = force->counts_per_torque;
-  }
-  return std::make_unique<FalconDriver>(std::move(line), settings);
 }
 
 void check_falcon(const servo::DeviceConfig& config) {

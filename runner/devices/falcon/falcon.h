@@ -230,9 +230,4 @@ std::unique_ptr<servo::Device> open_falcon(const servo::DeviceConfig& config);
 /// have their registration. \throws TransportError, InputError.
 std::unique_ptr<servo::Device> open_falcon2(const servo::DeviceConfig& config);
 
-/// The driver of one Falcon, with the calibrated scale of force if there is a plausible one. Shows
-/// the progress of an upload on a terminal. \throws TransportError, InputError.
-std::unique_ptr<FalconDriver> open_driver(const std::string& serial, const std::string& firmware,
-                                          const Calibration& calibration);
-
 }  // namespace palpate::runner::devices::falcon

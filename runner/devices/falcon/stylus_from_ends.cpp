@@ -81,7 +81,7 @@ class Procedure {
   bool answered() {
     const Guide::Answer answer = guide_.answer();
     if (answer == Guide::Answer::stop) throw GuideError("stopped; nothing was stored");
-    return answer == Guide::Answer::go_on;
+    return answer == Guide::Answer::proceed;
   }
 
   servo::Device &tip_, &tail_;

@@ -8,7 +8,9 @@
 #include <span>
 #include <utility>
 
+#include "stimuli/convex_mesh.h"
 #include "stimuli/parts/facets.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "stimuli/shapes.h"
 #include "stimuli/solids/solid_mesh.h"

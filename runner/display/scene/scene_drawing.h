@@ -19,6 +19,7 @@
 #include "runner/display/scene/picture.h"
 #include "runner/servo/sample.h"
 #include "runner/servo/touched_places.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::runner::display {

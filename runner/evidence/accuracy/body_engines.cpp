@@ -2,6 +2,7 @@
 #include "rendering/probe.h"
 #include "rendering/renderer.h"
 #include "runner/evidence/accuracy/body_study.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::evidence {

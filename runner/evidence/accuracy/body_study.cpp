@@ -13,6 +13,8 @@
 #include "rendering/bodies/soft/soft_scene.h"
 #include "rendering/renderer.h"
 #include "runner/evidence/accuracy/analytic_stroke.h"
+#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::evidence {

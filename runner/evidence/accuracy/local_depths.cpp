@@ -12,6 +12,8 @@
 #include <utility>
 #include <vector>
 
+#include "stimuli/convex_mesh.h"
+
 namespace palpate::runner::evidence::depths {
 
 // Shared by the local penetration depths of all shapes.

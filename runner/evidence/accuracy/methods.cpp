@@ -12,6 +12,7 @@
 #include "rendering/separation.h"
 #include "runner/evidence/accuracy/peers.h"
 #include "runner/evidence/verification/reference.h"
+#include "stimuli/convex_mesh.h"
 
 namespace palpate::runner::evidence {
 namespace {

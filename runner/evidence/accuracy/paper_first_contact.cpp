@@ -8,6 +8,7 @@
 #include "rendering/first_contact.h"
 #include "runner/evidence/verification/random_solids.h"
 #include "runner/evidence/verification/reference.h"
+#include "stimuli/convex_mesh.h"
 
 namespace palpate::runner::evidence {
 namespace {

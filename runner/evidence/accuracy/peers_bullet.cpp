@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "runner/evidence/accuracy/peers_hull.h"
+#include "stimuli/convex_mesh.h"
 
 namespace palpate::runner::evidence::peers {
 namespace {

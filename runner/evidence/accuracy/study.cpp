@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "runner/evidence/accuracy/analytic_stroke.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 #include "stimuli/shapes.h"
 

@@ -11,6 +11,7 @@
 #include "runner/evidence/verification/random_solids.h"
 #include "runner/evidence/verification/reference.h"
 #include "stimuli/orientation.h"
+#include "stimuli/polygon_soup.h"
 
 namespace palpate::runner::evidence {
 namespace {

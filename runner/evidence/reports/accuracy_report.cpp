@@ -244,75 +244,6 @@ constexpr const char* kQuestion =
     "direction 10 degrees, surface position 1 mm), and below what a device resolves (0.03 mm); "
     "point and ray.";
 
-}  // namespace
-
-std::string significant(double value) {
-  char text[32];
-  if (value != 0 && (std::abs(value) < 1e-3 || std::abs(value) >= 1e5)) {
-    std::snprintf(text, sizeof text, "%.1e", value);
-  } else {
-    std::snprintf(text, sizeof text, "%.3g", value);
-  }
-  return text;
-}
-
-std::string thousands(long long n) {
-  std::string digits = std::to_string(n);
-  for (int at = static_cast<int>(digits.size()) - 3; at > 0; at -= 3) {
-    digits.insert(static_cast<std::size_t>(at), ",");
-  }
-  return digits;
-}
-
-std::string share(std::size_t part, std::size_t all) {
-  return part == 0 ? "0"
-                   : significant(100.0 * static_cast<double>(part) / static_cast<double>(all));
-}
-
-std::string recommendation(const AccuracyReport& report, const std::string& shape) {
-  const int hand = evidence::triangles_for(report.rows, shape, kHand);
-  const int device = evidence::triangles_for(report.rows, shape, kDevice);
-  if (is_flat_sided(shape)) {
-    const int only =
-        std::ranges::find(report.rows, shape, &evidence::AccuracyRow::shape)->triangles;
-    return shape + ": its " + choice(report, shape, only) +
-           " are the shape itself: there is nothing to choose (errors below " +
-           significant(1e3 * worse(report, shape, only, depth_of)) + " mm and " +
-           significant(worse(report, shape, only, normal_of) / kDegree) + " degrees).";
-  }
-  const auto within = [&](int triangles) {
-    return significant(worse(report, shape, triangles, normal_of) / kDegree) + " degrees and " +
-           significant(1e3 * worse(report, shape, triangles, depth_of)) + " mm";
-  };
-  std::string text = shape + ": ";
-  text += hand == 0 ? "none of these is fine enough for the hand"
-                    : choice(report, shape, hand) + " for the hand (within " + within(hand) + ")";
-  if (device == 0) return text + "; none is fine enough for the device.";
-  if (device == hand) return text + ", which is finer than the device resolves as well.";
-  return text + "; " + choice(report, shape, device) +
-         " to be finer than the device resolves (within " + within(device) + ").";
-}
-
-stimuli::ShapeTraits traits_of_shape(const std::string& name) {
-  for (const stimuli::ShapeKind shape : stimuli::kShapes) {
-    if (name == stimuli::traits_of(shape).name) return stimuli::traits_of(shape);
-  }
-  return {};
-}
-
-bool is_flat_sided(const std::string& shape) {
-  const stimuli::ShapeTraits traits = traits_of_shape(shape);
-  return !traits.subdivisions && !traits.segments;
-}
-
-std::vector<std::string> measured_shapes(const AccuracyReport& report) {
-  std::vector<std::string> all;
-  for (const evidence::AccuracyRow& row : report.rows) {
-    if (std::find(all.begin(), all.end(), row.shape) == all.end()) all.push_back(row.shape);
-  }
-  return all;
-}
-
 std::vector<std::string> recommendations(const AccuracyReport& report) {
   std::vector<std::string> all;
   for (const std::string& shape : measured_shapes(report)) {
@@ -321,29 +252,9 @@ std::vector<std::string> recommendations(const AccuracyReport& report) {
   return all;
 }
 
-std::vector<analysis::Table> accuracy_tables(const AccuracyReport& report) {
-  std::vector<analysis::Table> tables;
-  const std::vector<std::string> shapes = measured_shapes(report);
-  tables.reserve(shapes.size());
-  for (const std::string& shape : shapes) tables.push_back(tessellation_table(report, shape));
-  for (const std::string& shape : shapes) {
-    for (const int triangles : tessellations_shown(report, shape)) {
-      tables.push_back(method_table(report, shape, triangles));
-    }
-  }
-  if (!report.first_contacts.empty()) tables.push_back(first_contact_table(report));
-  if (!report.unions.empty()) tables.push_back(union_table(report));
-  if (!report.bodies.empty()) tables.push_back(body_table(report));
-  if (!report.soft.empty()) tables.push_back(soft_table(report));
-  if (!report.extremes.empty()) tables.push_back(extreme_table(report));
-  if (report.search) tables.push_back(search_table(*report.search, report.search_seed));
-  if (report.union_search)
-    tables.push_back(union_search_table(*report.union_search, report.search_seed));
-  return tables;
-}
-
 // Tables of contact with unions of convex parts.
 
+/// Contact with unions of convex parts, and its search.
 analysis::Table union_table(const AccuracyReport& report) {
   analysis::Table table;
   table.caption = "Objects of several convex parts and tools of several segments: three ways";
@@ -414,6 +325,7 @@ analysis::Table union_search_table(const evidence::UnionCounts& c, std::uint64_t
   return table;
 }
 
+/// Soft bodies.
 analysis::Table soft_table(const AccuracyReport& report) {
   analysis::Table table;
   table.caption = "Soft bodies: known solutions against the computed ones";
@@ -436,6 +348,7 @@ analysis::Table soft_table(const AccuracyReport& report) {
 
 // Table of bodies that move and collide.
 
+/// Bodies that move and collide, beside other engines.
 analysis::Table body_table(const AccuracyReport& report) {
   analysis::Table table;
   table.caption = "Bodies that move and collide: error and run time beside other engines";
@@ -454,6 +367,96 @@ analysis::Table body_table(const AccuracyReport& report) {
       " us, 99th percentile " + significant(cost.p99) + " us, worst " + significant(cost.most) +
       " us.");
   return table;
+}
+
+}  // namespace
+
+std::string significant(double value) {
+  char text[32];
+  if (value != 0 && (std::abs(value) < 1e-3 || std::abs(value) >= 1e5)) {
+    std::snprintf(text, sizeof text, "%.1e", value);
+  } else {
+    std::snprintf(text, sizeof text, "%.3g", value);
+  }
+  return text;
+}
+
+std::string thousands(long long n) {
+  std::string digits = std::to_string(n);
+  for (int at = static_cast<int>(digits.size()) - 3; at > 0; at -= 3) {
+    digits.insert(static_cast<std::size_t>(at), ",");
+  }
+  return digits;
+}
+
+std::string share(std::size_t part, std::size_t all) {
+  return part == 0 ? "0"
+                   : significant(100.0 * static_cast<double>(part) / static_cast<double>(all));
+}
+
+std::string recommendation(const AccuracyReport& report, const std::string& shape) {
+  const int hand = evidence::triangles_for(report.rows, shape, kHand);
+  const int device = evidence::triangles_for(report.rows, shape, kDevice);
+  if (is_flat_sided(shape)) {
+    const int only =
+        std::ranges::find(report.rows, shape, &evidence::AccuracyRow::shape)->triangles;
+    return shape + ": its " + choice(report, shape, only) +
+           " are the shape itself: there is nothing to choose (errors below " +
+           significant(1e3 * worse(report, shape, only, depth_of)) + " mm and " +
+           significant(worse(report, shape, only, normal_of) / kDegree) + " degrees).";
+  }
+  const auto within = [&](int triangles) {
+    return significant(worse(report, shape, triangles, normal_of) / kDegree) + " degrees and " +
+           significant(1e3 * worse(report, shape, triangles, depth_of)) + " mm";
+  };
+  std::string text = shape + ": ";
+  text += hand == 0 ? "none of these is fine enough for the hand"
+                    : choice(report, shape, hand) + " for the hand (within " + within(hand) + ")";
+  if (device == 0) return text + "; none is fine enough for the device.";
+  if (device == hand) return text + ", which is finer than the device resolves as well.";
+  return text + "; " + choice(report, shape, device) +
+         " to be finer than the device resolves (within " + within(device) + ").";
+}
+
+stimuli::ShapeTraits traits_of_shape(const std::string& name) {
+  for (const stimuli::ShapeKind shape : stimuli::kShapes) {
+    if (name == stimuli::traits_of(shape).name) return stimuli::traits_of(shape);
+  }
+  return {};
+}
+
+bool is_flat_sided(const std::string& shape) {
+  const stimuli::ShapeTraits traits = traits_of_shape(shape);
+  return !traits.subdivisions && !traits.segments;
+}
+
+std::vector<std::string> measured_shapes(const AccuracyReport& report) {
+  std::vector<std::string> all;
+  for (const evidence::AccuracyRow& row : report.rows) {
+    if (std::find(all.begin(), all.end(), row.shape) == all.end()) all.push_back(row.shape);
+  }
+  return all;
+}
+
+std::vector<analysis::Table> accuracy_tables(const AccuracyReport& report) {
+  std::vector<analysis::Table> tables;
+  const std::vector<std::string> shapes = measured_shapes(report);
+  tables.reserve(shapes.size());
+  for (const std::string& shape : shapes) tables.push_back(tessellation_table(report, shape));
+  for (const std::string& shape : shapes) {
+    for (const int triangles : tessellations_shown(report, shape)) {
+      tables.push_back(method_table(report, shape, triangles));
+    }
+  }
+  if (!report.first_contacts.empty()) tables.push_back(first_contact_table(report));
+  if (!report.unions.empty()) tables.push_back(union_table(report));
+  if (!report.bodies.empty()) tables.push_back(body_table(report));
+  if (!report.soft.empty()) tables.push_back(soft_table(report));
+  if (!report.extremes.empty()) tables.push_back(extreme_table(report));
+  if (report.search) tables.push_back(search_table(*report.search, report.search_seed));
+  if (report.union_search)
+    tables.push_back(union_search_table(*report.union_search, report.search_seed));
+  return tables;
 }
 
 void put_wrapped(std::ostream& out, const std::string& text) {

@@ -71,14 +71,6 @@ void put_table(std::ostream& out, const analysis::Table& table);
 
 /// "sphere: ...", with the recommended tessellation.
 std::string recommendation(const AccuracyReport& report, const std::string& shape);
-std::vector<std::string> recommendations(const AccuracyReport& report);
-/// Contact with unions of convex parts, and its search.
-analysis::Table union_table(const AccuracyReport& report);
-/// Bodies that move and collide, beside other engines.
-analysis::Table body_table(const AccuracyReport& report);
-analysis::Table union_search_table(const evidence::UnionCounts& counts, std::uint64_t seed);
-/// Soft bodies.
-analysis::Table soft_table(const AccuracyReport& report);
 /// All results, in the order of display.
 std::vector<analysis::Table> accuracy_tables(const AccuracyReport& report);
 

@@ -19,7 +19,9 @@
 #include "runner/devices/simulated.h"
 #include "runner/scene_builder.h"
 #include "runner/servo/passivity.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/inset.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "stimuli/solids/solid_mesh.h"
 

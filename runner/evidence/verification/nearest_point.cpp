@@ -7,6 +7,8 @@
 #include <glm/matrix.hpp>
 #include <limits>
 
+#include "stimuli/convex_mesh.h"
+
 namespace palpate::runner::evidence {
 namespace {
 

@@ -9,7 +9,9 @@
 #include <utility>
 
 #include "runner/evidence/verification/reference.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/orientation.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::evidence {

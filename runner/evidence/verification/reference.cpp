@@ -5,6 +5,8 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "stimuli/convex_mesh.h"
+
 namespace palpate::runner::evidence {
 
 namespace {

@@ -18,7 +18,9 @@
 #include "runner/evidence/verification/nearest_point.h"
 #include "runner/evidence/verification/random_solids.h"
 #include "runner/evidence/verification/reference.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/orientation.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::evidence {

@@ -12,8 +12,10 @@
 #include "data/base/random.h"
 #include "rendering/bodies/rigid_motion.h"
 #include "stimuli/closed_surface.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/orientation.h"
 #include "stimuli/parts/convex_parts.h"
+#include "stimuli/polygon_soup.h"
 #include "tests/rendering/bodies/body_fixtures.h"
 #include "tests/stimuli/concave_solids.h"
 

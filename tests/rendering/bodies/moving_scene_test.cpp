@@ -12,6 +12,7 @@
 
 #include "rendering/surface.h"
 #include "stimuli/closed_surface.h"
+#include "stimuli/polygon_soup.h"
 #include "tests/rendering/bodies/body_fixtures.h"
 
 namespace palpate::rendering::test {

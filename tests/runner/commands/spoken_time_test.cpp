@@ -8,7 +8,7 @@
 #include <ctime>
 #include <string>
 
-#include "runner/commands/run/admission.h"
+#include "runner/station/admission.h"
 #include "tests/data/store/store_fixture.h"
 
 namespace palpate::runner::commands {
@@ -49,12 +49,13 @@ class SpokenTime : public ::testing::Test {
 TEST_F(SpokenTime, SaysTodayYesterdayOrADate) {
   stand_in("UTC0");
   const std::int64_t now = 1'772'323'200'000'000'000 + kHour / 2;  // 2026-03-01 00:30
-  EXPECT_EQ(spoken_time(now, now), "today 00:30");
-  EXPECT_EQ(spoken_time(now - kHour / 2, now), "today 00:00");
-  EXPECT_EQ(spoken_time(now - kHour, now), "yesterday 23:30");
-  EXPECT_EQ(spoken_time(now - 24 * kHour, now), "yesterday 00:30");
-  EXPECT_EQ(spoken_time(now - 25 * kHour, now), "2026-02-27 23:30");
-  EXPECT_EQ(spoken_time(now + 24 * kHour, now), "2026-03-02 00:30") << "a clock that was set back";
+  EXPECT_EQ(station::spoken_time(now, now), "today 00:30");
+  EXPECT_EQ(station::spoken_time(now - kHour / 2, now), "today 00:00");
+  EXPECT_EQ(station::spoken_time(now - kHour, now), "yesterday 23:30");
+  EXPECT_EQ(station::spoken_time(now - 24 * kHour, now), "yesterday 00:30");
+  EXPECT_EQ(station::spoken_time(now - 25 * kHour, now), "2026-02-27 23:30");
+  EXPECT_EQ(station::spoken_time(now + 24 * kHour, now), "2026-03-02 00:30")
+      << "a clock that was set back";
 }
 
 /// Central Europe: a day of 23 hours in March, one of 25 in October; and half an hour's change.
@@ -69,7 +70,7 @@ TEST_F(SpokenTime, FollowsTheCalendarAcrossChangesOfClocks) {
       const std::int64_t now = at * 1'000'000'000;
       for (const std::int64_t ago : {0, 1, 12, 23, 24, 25, 36, 47, 48, 49}) {
         const std::int64_t then = now - ago * kHour;
-        const std::string said = spoken_time(then, now);
+        const std::string said = station::spoken_time(then, now);
         const days apart = day_of(now) - day_of(then);
         const std::string word = said.substr(0, said.find(' '));
         if (apart == days(0)) {
@@ -95,8 +96,8 @@ TEST(WithdrawalTime, IsTheWithdrawalsNotTheSessions) {
   store.add_note(run, 5 + kHour_ns, "tired");
   store.add_note(run, 5 + 3 * kHour_ns, "ended: the participant withdrew");
   store.end_run(run, data::RunEnd::withdrawn, 5 + 3 * kHour_ns);
-  EXPECT_EQ(withdrawn_when(store, "W1"),
-            spoken_time(kBegan_ns + 3 * kHour_ns, kBegan_ns + 1000 * kHour_ns));
+  EXPECT_EQ(station::withdrawn_when(store, "W1"),
+            station::spoken_time(kBegan_ns + 3 * kHour_ns, kBegan_ns + 1000 * kHour_ns));
 }
 
 }  // namespace

@@ -63,7 +63,7 @@ TEST(TextInput, AltWithAKeyIsAnEmergencyNotAnAnswer) {
 
 TEST(TextInput, LinesAreCommands) {
   EXPECT_EQ(heard(":pause\n:go\r:repeat\n"),
-            command(Kind::pause) + command(Kind::go_on) + command(Kind::repeat_trial));
+            command(Kind::pause) + command(Kind::resume) + command(Kind::repeat_trial));
   EXPECT_EQ(heard(":stop\n: stop block \n:zero\n:clear\n"),
             command(Kind::stop_after_trial) + command(Kind::stop_after_block) +
                 command(Kind::emergency_zero, ":zero") + command(Kind::clear_fault));

@@ -157,7 +157,7 @@ TEST_F(TextScreens, TheChecklistNamesTheCurrentStepAndItsCommands) {
   EXPECT_EQ(console(state), "* step 3 of 4: weigh the grip\n");
   EXPECT_EQ(console(state), "");
   state.checklist.instruction = "home the device";
-  state.checklist.choices = {{ConsoleCommand::Kind::go_on, "it is home"},
+  state.checklist.choices = {{ConsoleCommand::Kind::resume, "it is home"},
                              {ConsoleCommand::Kind::quit, "end"}};
   EXPECT_EQ(console(state), "* step 3 of 4: home the device (':go': it is home; ':quit': end)\n");
 }

@@ -6,6 +6,7 @@
 
 #include "rendering/tool.h"
 #include "runner/display/scene/scene_drawing.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::display {

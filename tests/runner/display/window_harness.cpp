@@ -47,7 +47,7 @@ Checklist some_checklist() {
            {"Press the buttons", State::to_do}},
           "limits: forces of up to 2.5 N at each end (the device's own limit: 2.5 N), 0.5 N of "
           "change a tick; hold the grip: a push of 1.0 N to the right comes for a second",
-          {{ConsoleCommand::Kind::go_on, "push"},
+          {{ConsoleCommand::Kind::resume, "push"},
            {ConsoleCommand::Kind::repeat_trial, "once more"},
            {ConsoleCommand::Kind::quit, "no"}}};
 }

@@ -16,6 +16,7 @@
 #include "runner/safety/fault_signals.h"
 #include "runner/safety/guarded_device.h"
 #include "runner/servo/servo_thread.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 #include "tests/runner/recording_device.h"
 #include "tests/runner/safety/guard_stage.h"

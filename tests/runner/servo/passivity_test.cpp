@@ -13,6 +13,7 @@
 
 #include "data/base/random.h"
 #include "runner/servo/servo.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 #include "tests/runner/fake_device.h"
 

@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 #include "tests/runner/fake_device.h"
 

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "runner/servo/realtime.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 #include "tests/runner/fake_device.h"
 

@@ -17,6 +17,7 @@
 
 #include "runner/evidence/tick_meters.h"
 #include "runner/servo/servo_thread.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::servo {

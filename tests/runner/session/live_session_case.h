@@ -77,7 +77,7 @@ class Console final : public display::ExperimenterConsole {
     if (last.state == "paused" && resumes) {
       ++pauses;
       if (repair) repair();
-      out.push_back({display::ConsoleCommand::Kind::go_on, "", clock_.now_ns()});
+      out.push_back({display::ConsoleCommand::Kind::resume, "", clock_.now_ns()});
     }
     if (last.state == "fault" && in_fault) {
       if (in_fault_sees != nullptr) *in_fault_sees = last.held_by;
@@ -88,12 +88,12 @@ class Console final : public display::ExperimenterConsole {
       ++faults;
       if (repair) repair();
       out.push_back({display::ConsoleCommand::Kind::clear_fault, "", clock_.now_ns()});
-      out.push_back({display::ConsoleCommand::Kind::go_on, "", clock_.now_ns()});
+      out.push_back({display::ConsoleCommand::Kind::resume, "", clock_.now_ns()});
     }
     return out;
   }
   std::string name_of(display::ConsoleCommand::Kind kind) const override {
-    return kind == display::ConsoleCommand::Kind::go_on ? "'on'" : "'other'";
+    return kind == display::ConsoleCommand::Kind::resume ? "'on'" : "'other'";
   }
   display::ConsoleState last;
   std::function<void(const display::ConsoleState&)> shown;

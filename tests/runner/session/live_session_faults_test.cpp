@@ -71,7 +71,7 @@ TEST_F(LiveSessions, ADeviceUnpluggedInABreakIsReportedInTheBreak) {
     fault = now.fault;
     plugged = true;
     console_.next = {{display::ConsoleCommand::Kind::clear_fault, "", 0},
-                     {display::ConsoleCommand::Kind::go_on, "", 0}};
+                     {display::ConsoleCommand::Kind::resume, "", 0}};
   };
   const LiveSession::Outcome outcome = run(device);
   EXPECT_EQ(outcome.end, data::RunEnd::done);

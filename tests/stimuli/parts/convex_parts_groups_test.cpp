@@ -9,8 +9,10 @@
 #include <string>
 #include <vector>
 
+#include "stimuli/convex_mesh.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/parts/convex_parts.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "tests/stimuli/concave_solids.h"
 #include "tests/stimuli/part_checks.h"

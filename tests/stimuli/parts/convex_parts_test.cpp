@@ -10,7 +10,9 @@
 #include <glm/geometric.hpp>
 #include <string>
 
+#include "stimuli/convex_mesh.h"
 #include "stimuli/orientation.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "tests/stimuli/concave_solids.h"
 #include "tests/stimuli/part_checks.h"

@@ -6,8 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "stimuli/convex_mesh.h"
 #include "stimuli/mesh_names.h"
 #include "stimuli/parts/convex_parts.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::stimuli {

@@ -10,9 +10,11 @@
 #include <vector>
 
 #include "data/base/random.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/inset.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/parts/facets.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "tests/stimuli/concave_solids.h"
 

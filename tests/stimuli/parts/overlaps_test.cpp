@@ -9,8 +9,10 @@
 #include <vector>
 
 #include "data/base/random.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/orientation.h"
 #include "stimuli/parts/convex_parts.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/temporary_folder.h"
 #include "tests/stimuli/part_checks.h"

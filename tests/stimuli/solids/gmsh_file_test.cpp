@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "stimuli/polygon_soup.h"
 #include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::stimuli {

@@ -12,6 +12,8 @@
 
 #include "rendering/renderer.h"
 #include "runner/evidence/tick_meters.h"
+#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::rendering {

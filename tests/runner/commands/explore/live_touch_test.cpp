@@ -1,6 +1,6 @@
 // A scene touched by a hand, with and without a responsive display.
 
-#include "runner/commands/explore/live_touch.h"
+#include "runner/touch/live_touch.h"
 
 #include <gtest/gtest.h>
 
@@ -50,8 +50,8 @@ servo::DeviceReading pressing(int tick) {
   return reading;
 }
 
-LiveTouch::Settings settings_of() {
-  LiveTouch::Settings out;
+touch::LiveTouch::Settings settings_of() {
+  touch::LiveTouch::Settings out;
   out.scene_path = "scene.json";
   stimuli::ObjectSpec cube;
   cube.shape = stimuli::ShapeKind::cube;
@@ -83,7 +83,7 @@ class LiveTouchTest : public ::testing::Test {
 
 // Five seconds of ticks in which the display takes no samples.
 TEST_F(LiveTouchTest, AStalledDisplayNeitherDelaysNorLosesTicks) {
-  LiveTouch touch(device_, clock_, settings_of());
+  touch::LiveTouch touch(device_, clock_, settings_of());
   clock_.start();
   ASSERT_TRUE(comes_true([&] { return touch.recorded() >= 5000; }));
   std::vector<display::SceneMoment> moments;
@@ -127,9 +127,9 @@ TEST_F(LiveTouchTest, EachSceneIsATrialForOtherRecorders) {
     std::vector<std::unique_ptr<session::MarkerSink>> sinks;
     sinks.push_back(std::make_unique<Kept>(kept, count));
     session::Markers markers(std::move(sinks));
-    LiveTouch::Settings settings = settings_of();
+    touch::LiveTouch::Settings settings = settings_of();
     settings.markers = &markers;
-    LiveTouch touch(device_, clock_, settings);
+    touch::LiveTouch touch(device_, clock_, settings);
     clock_.start();
     ASSERT_TRUE(comes_true([&] { return count.load() >= 2; }));
     std::vector<stimuli::ObjectSpec> other = settings.spec.objects;
@@ -148,8 +148,8 @@ TEST_F(LiveTouchTest, EachSceneIsATrialForOtherRecorders) {
 }
 
 /// A cube that drifts with 10 mm/s, far from the hand.
-LiveTouch::Settings with_drifting_cube() {
-  LiveTouch::Settings settings = settings_of();
+touch::LiveTouch::Settings with_drifting_cube() {
+  touch::LiveTouch::Settings settings = settings_of();
   stimuli::ObjectSpec drifting;
   drifting.shape = stimuli::ShapeKind::cube;
   drifting.edge = 0.02;
@@ -162,7 +162,7 @@ LiveTouch::Settings with_drifting_cube() {
 
 /// Every moment has the poses of moving objects, and objects follow a pull.
 TEST_F(LiveTouchTest, MovingObjectsAreShownAndCanBePulled) {
-  LiveTouch touch(device_, clock_, with_drifting_cube());
+  touch::LiveTouch touch(device_, clock_, with_drifting_cube());
   clock_.start();
   ASSERT_TRUE(comes_true([&] { return touch.recorded() >= 1000; }));
   std::vector<display::SceneMoment> moments;
@@ -191,7 +191,7 @@ TEST_F(LiveTouchTest, MovingObjectsAreShownAndCanBePulled) {
 }
 
 TEST_F(LiveTouchTest, TheLastPartOfALongStallIsKept) {
-  LiveTouch touch(device_, clock_, settings_of());
+  touch::LiveTouch touch(device_, clock_, settings_of());
   clock_.start();
   ASSERT_TRUE(comes_true([&] { return touch.recorded() >= 70'000; }));
   std::vector<display::SceneMoment> moments;
@@ -203,7 +203,7 @@ TEST_F(LiveTouchTest, TheLastPartOfALongStallIsKept) {
 }
 
 TEST_F(LiveTouchTest, AfterAnEmergencyForcesStayOffUntilCleared) {
-  LiveTouch touch(device_, clock_, settings_of());
+  touch::LiveTouch touch(device_, clock_, settings_of());
   clock_.start();
   const auto newest = [&] {
     std::vector<display::SceneMoment> moments;
@@ -221,7 +221,7 @@ TEST_F(LiveTouchTest, AfterAnEmergencyForcesStayOffUntilCleared) {
 }
 
 TEST_F(LiveTouchTest, AHeldSceneGivesNoForceAndDoesNotChange) {
-  LiveTouch touch(device_, clock_, settings_of());
+  touch::LiveTouch touch(device_, clock_, settings_of());
   clock_.start();
   std::vector<display::SceneMoment> moments;
   ASSERT_TRUE(comes_true([&] { return touch.recorded() > 600; }));
@@ -247,7 +247,7 @@ void expect_no_gap(const std::vector<display::SceneMoment>& moments) {
 
 TEST_F(LiveTouchTest, APauseKeepsMovingObjectsAndStepsContinueFromIt) {
   FastClock clock(1);  // no minute may pass while the test is not scheduled
-  LiveTouch touch(device_, clock, with_drifting_cube());
+  touch::LiveTouch touch(device_, clock, with_drifting_cube());
   clock.start();
   std::vector<display::SceneMoment> moments;
   ASSERT_TRUE(comes_true([&] { return touch.recorded() > 600; }));
@@ -287,7 +287,7 @@ TEST_F(LiveTouchTest, AfterAPauseTheSceneResumesOnceTheHandIsBack) {
     return reading;
   });
   FastClock clock(1);
-  LiveTouch touch(device, clock, with_drifting_cube());
+  touch::LiveTouch touch(device, clock, with_drifting_cube());
   clock.start();
   ASSERT_TRUE(comes_true([&] { return touch.recorded() > 600; }));
   touch.hold(true);
@@ -311,7 +311,7 @@ TEST_F(LiveTouchTest, AfterAPauseTheSceneResumesOnceTheHandIsBack) {
 
 /// The hand stays in the cube.
 TEST_F(LiveTouchTest, AnotherMaterialIsFeltByARamp) {
-  LiveTouch touch(device_, clock_, settings_of());
+  touch::LiveTouch touch(device_, clock_, settings_of());
   clock_.start();
   std::vector<double> stiffness;
   const auto becomes = [&](double wanted) {
@@ -345,7 +345,7 @@ TEST_F(LiveTouchTest, AnotherMaterialActsOnceTheHandHasLeft) {
     reading.stylus = {{0, y, 0}, {0, y + 0.12, 0}};
     return reading;
   });
-  LiveTouch touch(device, clock_, settings_of());
+  touch::LiveTouch touch(device, clock_, settings_of());
   clock_.start();
   const auto stiffness_becomes = [&](double wanted) {
     return comes_true([&] {

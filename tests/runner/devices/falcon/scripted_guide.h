@@ -23,7 +23,7 @@ class ScriptedGuide final : public Guide {
   }
   Answer answer() override {
     if (--patience_ > 0) return Answer::none;  // ticks continue
-    return going_on_ ? Answer::go_on : Answer::stop;
+    return going_on_ ? Answer::proceed : Answer::stop;
   }
 
   std::vector<std::string> said, asked;

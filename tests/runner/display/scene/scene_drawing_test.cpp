@@ -13,6 +13,8 @@
 #include "rendering/contact.h"
 #include "rendering/renderer.h"
 #include "runner/display/scene/camera.h"
+#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::display {

@@ -11,6 +11,7 @@
 
 #include "runner/evidence/accuracy/analytic_stroke.h"
 #include "runner/evidence/accuracy/methods.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/probe_paths.h"
 

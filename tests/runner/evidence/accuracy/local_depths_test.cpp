@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "runner/evidence/verification/reference.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/probe_paths.h"
 

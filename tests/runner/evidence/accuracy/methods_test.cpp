@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::evidence {

@@ -4,6 +4,7 @@
 
 #include <glm/geometric.hpp>
 
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::evidence {

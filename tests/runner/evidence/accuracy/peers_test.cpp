@@ -10,6 +10,8 @@
 #include <string>
 
 #include "runner/evidence/verification/reference.h"
+#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/probe_paths.h"
 

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <map>
 
+#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::evidence {

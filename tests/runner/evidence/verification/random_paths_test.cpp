@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "runner/evidence/verification/random_solids.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::evidence {

@@ -10,6 +10,7 @@
 #include <limits>
 
 #include "runner/evidence/verification/random_solids.h"
+#include "stimuli/convex_mesh.h"
 
 namespace palpate::runner::evidence {
 namespace {

@@ -13,7 +13,9 @@
 #include "runner/evidence/verification/reference.h"
 #include "runner/evidence/verification/search.h"
 #include "runner/evidence/verification/union_cases.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/orientation.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::evidence {

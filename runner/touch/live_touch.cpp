@@ -1,4 +1,4 @@
-#include "runner/commands/explore/live_touch.h"
+#include "runner/touch/live_touch.h"
 
 #include <chrono>
 #include <cmath>
@@ -15,8 +15,6 @@
 
 #include "data/base/text.h"
 #include "data/files/file_permissions.h"
-#include "runner/commands/run/opening.h"
-#include "runner/commands/shared/command.h"
 #include "runner/display/explore_window.h"
 #include "runner/display/timeline.h"
 #include "runner/output/outputs.h"
@@ -25,10 +23,12 @@
 #include "runner/serve/served_scene.h"
 #include "runner/servo/sample.h"
 #include "runner/session/device_check.h"
+#include "runner/station/opening.h"
 #include "runner/touch/forces.h"
 #include "runner/touch/scene_notes.h"
+#include "runner/usage_error.h"
 
-namespace palpate::runner::commands {
+namespace palpate::runner::touch {
 namespace {
 
 constexpr double kSoftInterval =
@@ -95,17 +95,17 @@ int explore_live(const protocols::SceneSpec& spec, const rendering::Renderer& re
                  const HandsOnSettings& settings) {
   protocols::Protocol protocol = serve::protocol_of(spec, renderer);
   protocol.material_limit = protocols::MaterialLimit::limit;
-  const RunSettings& run = settings.run;
-  const devices::DeviceKind& kind = find_device_kind(run.device);
+  const station::RunSettings& run = settings.run;
+  const devices::DeviceKind& kind = station::find_device_kind(run.device);
   display::ExploreSettings window = window_settings(spec, renderer, settings);
-  auto sinks = open_markers(run);
+  auto sinks = station::open_markers(run);
   safety::FaultSignals signals;
-  const OpenDevice open = open_device(kind, run, protocol);
+  const station::OpenDevice open = station::open_device(kind, run, protocol);
   signals.watch(open.guard);
   session::Markers markers(std::move(sinks), protocols::usual_event_codes(), run.sync);
-  const auto stream = open_stream(run, protocol.servo_rate);
+  const auto stream = station::open_stream(run, protocol.servo_rate);
   const servo::DeviceCapabilities& device = open.device->capabilities();
-  if (open.guard != nullptr) check_fitness(open, run, protocol, StimulusLibrary(protocol));
+  if (open.guard != nullptr) station::check_fitness(open, run, protocol, StimulusLibrary(protocol));
   servo::RealClock clock;
   servo::ServoSettings servo;
   servo.rate = protocol.servo_rate;
@@ -137,7 +137,7 @@ int explore_live(const protocols::SceneSpec& spec, const rendering::Renderer& re
   const servo::ServoHealth& health = touch.servo().health();
   std::cout << health.ticks() << " ticks, " << health.missed_ticks() << " missed, "
             << health.lost_samples() << " not shown\n";
-  print_dropped(markers, stream.get());
+  station::print_dropped(markers, stream.get());
   return 0;
 }
 
@@ -275,7 +275,7 @@ void LiveTouch::keep(const servo::Sample& sample, std::span<const rendering::Bod
   if (sample.time_ns == last_ns_) return;  // the servo has stopped and repeats its last sample
   last_ns_ = sample.time_ns;
   patience_.begin();
-  tell_recorders(sample);
+  inform_recorders(sample);
   display::SceneMoment moment{.sample = sample, .contacts = {}};
   if (stepping_) {  // the hand got almost no force: show the full one
     moment.sample.device1 = sample.rendering.device1;
@@ -302,7 +302,7 @@ void LiveTouch::keep(const servo::Sample& sample, std::span<const rendering::Bod
   recorded_.fetch_add(1);
 }
 
-void LiveTouch::tell_recorders(const servo::Sample& sample) {
+void LiveTouch::inform_recorders(const servo::Sample& sample) {
   if (settings_.stream != nullptr) settings_.stream->push(sample);
   if (settings_.markers == nullptr || sample.phase != servo::Phase::feeling) return;
   const auto send = [&](session::Marker::Kind kind) {
@@ -353,7 +353,7 @@ void LiveTouch::update_soft(std::int64_t now_ns) {
   }
 }
 
-void LiveTouch::tell_trouble(const std::string& trouble) {
+void LiveTouch::report_trouble(const std::string& trouble) {
   const std::lock_guard lock(mutex_);
   trouble_ = trouble;
 }
@@ -362,7 +362,7 @@ void LiveTouch::keep_what_is_there() {
   while (const servo::Sample* const sample = servo_.next_now()) keep(*sample, servo_.bodies());
 }
 
-void LiveTouch::stop_or_go_on(std::optional<std::vector<stimuli::ObjectSpec>> wanted) {
+void LiveTouch::stop_or_continue(std::optional<std::vector<stimuli::ObjectSpec>> wanted) {
   const bool held = held_.load();
   if (held && running_) {
     servo_.stop();
@@ -383,7 +383,7 @@ void LiveTouch::stop_or_go_on(std::optional<std::vector<stimuli::ObjectSpec>> wa
       }
     } catch (const std::exception& fault) {
       shown_ = before;
-      tell_trouble(fault.what());
+      report_trouble(fault.what());
     }
   }
   const int steps = held ? steps_.exchange(0) : 0;
@@ -414,12 +414,12 @@ void LiveTouch::record(const std::stop_token& stop) {
       const std::lock_guard lock(mutex_);
       wanted.swap(wanted_);
     }
-    stop_or_go_on(std::move(wanted));
+    stop_or_continue(std::move(wanted));
     keep_what_is_there();
     if (servo_.away() > 0) patience_.begin();
     if (running_ && patience_.is_over()) {
       servo_.emergency_zero();  // in case it returns
-      tell_trouble("the servo gives no more samples: forces are off");
+      report_trouble("the servo gives no more samples: forces are off");
     }
     std::this_thread::sleep_for(kIdle);
   }
@@ -451,4 +451,4 @@ std::string LiveTouch::trouble() const {
   return trouble_;
 }
 
-}  // namespace palpate::runner::commands
+}  // namespace palpate::runner::touch

@@ -8,7 +8,6 @@
 
 #include "data/store/store.h"
 #include "protocols/protocol.h"
-#include "runner/commands/run/settings.h"
 #include "runner/devices/registry.h"
 #include "runner/display/window.h"
 #include "runner/participants/keyboard.h"
@@ -18,8 +17,9 @@
 #include "runner/session/markers.h"
 #include "runner/session/sample_stream.h"
 #include "runner/sound/masking_noise.h"
+#include "runner/station/run_settings.h"
 
-namespace palpate::runner::commands {
+namespace palpate::runner::station {
 
 /// \throws UsageError: there is no such device
 const devices::DeviceKind& find_device_kind(const std::string& name);
@@ -72,4 +72,4 @@ std::unique_ptr<display::DisplayLoop> open_display(const RunSettings& settings,
                                                    servo::Device& device,
                                                    const std::function<void()>& emergency);
 
-}  // namespace palpate::runner::commands
+}  // namespace palpate::runner::station

@@ -1,4 +1,4 @@
-#include "runner/commands/movement/movement_study.h"
+#include "runner/movement/movement_study.h"
 
 #include <atomic>
 #include <exception>
@@ -11,14 +11,14 @@
 #include <vector>
 
 #include "data/base/text.h"
-#include "runner/commands/shared/command.h"
 #include "runner/movement/touched_trial.h"
 #include "runner/output/outputs.h"
 #include "runner/output/progress_line.h"
 #include "runner/session/replay.h"
 #include "runner/study/study_trials.h"
+#include "runner/usage_error.h"
 
-namespace palpate::runner::commands {
+namespace palpate::runner::movement {
 namespace {
 
 /// The kept values of a trial.
@@ -200,4 +200,4 @@ MovementStudy measure_study(const MovementRequest& request) {
   return study;
 }
 
-}  // namespace palpate::runner::commands
+}  // namespace palpate::runner::movement

@@ -11,7 +11,7 @@
 #include "analysis/movement/pictures.h"
 #include "data/store/store.h"
 
-namespace palpate::runner::commands {
+namespace palpate::runner::movement {
 
 struct MovementRequest {
   std::string database, mesh_folder;
@@ -39,4 +39,4 @@ void require_samples(const MovementStudy& study, const std::string& database);
 /// The same values whatever the jobs. \throws UsageError, InputError
 MovementStudy measure_study(const MovementRequest& request);
 
-}  // namespace palpate::runner::commands
+}  // namespace palpate::runner::movement

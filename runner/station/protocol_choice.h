@@ -9,7 +9,7 @@
 #include "protocols/difference.h"
 #include "protocols/protocol.h"
 
-namespace palpate::runner::commands {
+namespace palpate::runner::station {
 
 /// The protocol that a participant began with, if it differs from the named one.
 struct EarlierProtocol {
@@ -41,4 +41,4 @@ ProtocolChoice choose_protocol(const ChangedProtocol& changed);
 /// The differences and the choice, for the record.
 std::string to_json_text(const ChangedProtocol& changed, ProtocolChoice choice);
 
-}  // namespace palpate::runner::commands
+}  // namespace palpate::runner::station

@@ -1,4 +1,4 @@
-#include "runner/commands/run/opening.h"
+#include "runner/station/opening.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -10,11 +10,11 @@
 #include "data/base/text.h"
 #include "protocols/answer_keys.h"
 #include "protocols/tasks/texts.h"
-#include "runner/commands/shared/command.h"
 #include "runner/display/text_display.h"
 #include "runner/session/device_check.h"
+#include "runner/usage_error.h"
 
-namespace palpate::runner::commands {
+namespace palpate::runner::station {
 const devices::DeviceKind& find_device_kind(const std::string& name) {
   try {
     return devices::device_kind(name);
@@ -200,4 +200,4 @@ std::unique_ptr<display::DisplayLoop> open_display(const RunSettings& settings,
   return display::make_text_display({&clock, emergency});
 }
 
-}  // namespace palpate::runner::commands
+}  // namespace palpate::runner::station

@@ -1,4 +1,4 @@
-#include "runner/commands/shared/protocol_choice.h"
+#include "runner/station/protocol_choice.h"
 
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -12,9 +12,10 @@
 #include "data/files/utc.h"
 #include "data/store/store.h"
 #include "protocols/protocol.h"
-#include "runner/commands/shared/command.h"
+#include "runner/terminal.h"
+#include "runner/usage_error.h"
 
-namespace palpate::runner::commands {
+namespace palpate::runner::station {
 namespace {
 
 std::string to_the_minute(std::int64_t utc_ns) {
@@ -134,4 +135,4 @@ std::string to_json_text(const ChangedProtocol& changed, ProtocolChoice choice) 
   return nlohmann::ordered_json{{"protocol_change", what}}.dump();
 }
 
-}  // namespace palpate::runner::commands
+}  // namespace palpate::runner::station

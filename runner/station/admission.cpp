@@ -1,4 +1,4 @@
-#include "runner/commands/run/admission.h"
+#include "runner/station/admission.h"
 
 #include <algorithm>
 #include <chrono>
@@ -20,13 +20,14 @@
 #include "protocols/difference.h"
 #include "protocols/parse.h"
 #include "runner/build_info.h"
-#include "runner/commands/run/settings.h"
-#include "runner/commands/shared/command.h"
-#include "runner/commands/shared/protocol_choice.h"
 #include "runner/session/device_check.h"
 #include "runner/session/run_record.h"
+#include "runner/station/protocol_choice.h"
+#include "runner/station/run_settings.h"
+#include "runner/terminal.h"
+#include "runner/usage_error.h"
 
-namespace palpate::runner::commands {
+namespace palpate::runner::station {
 namespace {
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
@@ -205,6 +206,12 @@ void count_on(data::Store& store, const protocols::Protocol& protocol, const Run
   known.number = settings.number.value_or(next);
 }
 
+/// Refuses a code whose newest run, in any protocol, ended with a withdrawal. \throws UsageError
+void refuse_withdrawn(data::Store& store, const std::string& code) {
+  const std::string when = withdrawn_when(store, code);
+  if (!when.empty()) throw_withdrawn(code, when);
+}
+
 /// Reads the database briefly: it is closed again before a question is asked or a guard is forked.
 Known look_into(const RunSettings& settings, const protocols::Protocol& protocol,
                 const std::string& code) {
@@ -362,11 +369,6 @@ void throw_withdrawn(const std::string& code, const std::string& when) {
                    "--after-withdrawal; 'palpate forget' removes the data on record");
 }
 
-void refuse_withdrawn(data::Store& store, const std::string& code) {
-  const std::string when = withdrawn_when(store, code);
-  if (!when.empty()) throw_withdrawn(code, when);
-}
-
 int choose_session(data::Store& store, const data::Participant& participant,
                    const protocols::Protocol& protocol, const RunSettings& settings) {
   const int session = session_due(store, participant, protocol, settings);
@@ -442,4 +444,4 @@ Admission admit(const RunSettings& settings) {
   return admission;
 }
 
-}  // namespace palpate::runner::commands
+}  // namespace palpate::runner::station

@@ -11,10 +11,10 @@
 #include "data/store/store.h"
 #include "protocols/protocol.h"
 #include "protocols/session_plan.h"
-#include "runner/commands/run/settings.h"
 #include "runner/servo/device.h"
+#include "runner/station/run_settings.h"
 
-namespace palpate::runner::commands {
+namespace palpate::runner::station {
 
 // Participant codes that are easily mistaken for each other.
 
@@ -38,16 +38,11 @@ std::string spoken_time(std::int64_t utc_ns, std::int64_t now_utc_ns);
 std::string resumption(data::Store& store, const data::Participant& participant, int session,
                        const protocols::SessionPlan& plan);
 
-/// Refuses a code whose newest run, in any protocol, ended with a withdrawal. \throws UsageError
-void refuse_withdrawn(data::Store& store, const std::string& code);
-
 /// \param when  in words; empty: not stated
 [[noreturn]] void throw_withdrawn(const std::string& code, const std::string& when);
 
 /// The time of the withdrawal, in words; empty: none.
 std::string withdrawn_when(data::Store& store, const std::string& code);
-
-struct RunSettings;
 
 struct Admission {
   std::string participant;       ///< may differ from the named one
@@ -75,4 +70,4 @@ data::RunInfo run_info(const RunSettings& settings, const servo::DeviceCapabilit
 /// The protocol as shown, if its texts differ from those of the participant's protocol.
 std::optional<data::ProtocolInfo> other_texts(const Admission& admission);
 
-}  // namespace palpate::runner::commands
+}  // namespace palpate::runner::station

@@ -15,14 +15,15 @@
 
 #include "protocols/parse.h"
 #include "rendering/renderer.h"
-#include "runner/commands/run/settings.h"
 #include "runner/display/display.h"
 #include "runner/servo/servo_thread.h"
 #include "runner/session/markers.h"
 #include "runner/session/sample_stream.h"
+#include "runner/station/run_settings.h"
 #include "runner/touch/forces.h"
+#include "stimuli/polygon_soup.h"
 
-namespace palpate::runner::commands {
+namespace palpate::runner::touch {
 
 /// The moment of a scene at a tick along a recorded path. \param state  after the tick
 display::SceneMoment moment_of(const touch::TimedPose& pose, const protocols::SceneSpec& spec,
@@ -62,7 +63,7 @@ struct HandsOnSettings {
   std::string scene_path, trajectory;  ///< trajectory: recorded path; empty: a device's
   std::string pictures;                ///< folder for those that are kept; empty: none
   bool labels = false;
-  RunSettings run;  ///< the device, and other recorders
+  station::RunSettings run;  ///< the device, and other recorders
 };
 
 /// Touches the scene in a window until that is closed. \return exit status
@@ -111,10 +112,10 @@ class LiveTouch final : public display::TouchSource {
 
  private:
   void record(const std::stop_token& stop);
-  void stop_or_go_on(std::optional<std::vector<stimuli::ObjectSpec>> wanted);
+  void stop_or_continue(std::optional<std::vector<stimuli::ObjectSpec>> wanted);
   void keep_what_is_there();
-  void tell_trouble(const std::string& trouble);
-  void tell_recorders(const servo::Sample& sample);
+  void report_trouble(const std::string& trouble);
+  void inform_recorders(const servo::Sample& sample);
   protocols::SceneSpec with_objects(const std::vector<stimuli::ObjectSpec>& objects) const;
   void prepare(const std::vector<stimuli::ObjectSpec>& objects);
   std::int64_t period_ns() const;
@@ -147,4 +148,4 @@ class LiveTouch final : public display::TouchSource {
   std::jthread recorder_;  ///< last: ends first
 };
 
-}  // namespace palpate::runner::commands
+}  // namespace palpate::runner::touch
