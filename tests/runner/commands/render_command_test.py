@@ -166,9 +166,11 @@ class Render(CommandCase):
         self.assertNotIn("layers/0", done.stderr)
 
     def test_forty_objects_are_rendered_without_a_fault(self):
-        cube = '{"shape": "cube", "edge_m": 0.05, "stiffness_n_per_m": 100}'
-        scene = '{"objects": [' + ", ".join([cube] * 40) + "]}"
-        row = self.render(scene, "ray", [[0, 0.01, 0, 0.03, 0.01, 0, 0.15], [1, 0.01, 0, 0.024, 0.01, 0, 0.144]])[1]
+        """Apart from each other: those that touch are one solid."""
+        cubes = [f'{{"shape": "cube", "edge_m": 0.004, "stiffness_n_per_m": 100, "position_m": [{-0.117 + 0.006 * i:.3f}, 0, 0]}}'
+                 for i in range(40)]
+        scene = '{"objects": [' + ", ".join(cubes) + "]}"
+        row = self.render(scene, "ray", [[0, -0.125, 0, 0.012, 0.125, 0, 0.012], [1, -0.125, 0, 0.001, 0.125, 0, 0.001]])[1]
         self.assertEqual((row["contacts"], row["faults"]), (40, ""))
         self.assertAlmostEqual(row["force_z"], 4.0, 9)
 
