@@ -66,7 +66,7 @@ TEST(LinearAxis, HasAboutFiveSteps) {
             (Labels{"0.000", "0.005", "0.010", "0.015", "0.020"}));
 }
 
-TEST(LinearAxis, OfOneValueHasAWidth) {
+TEST(LinearAxis, HasAWidthForOneValue) {
   for (const double value : {0.0, 3.0, -2.5}) {
     const FigureAxis axis = linear_axis(value, value, "");
     EXPECT_LE(axis.low, value);
@@ -104,7 +104,7 @@ TEST(LogAxis, HasFewerTicksOverManyDecades) {
   EXPECT_EQ(log_axis(0, 9, "").ticks.size(), 10U) << "nine decades have every power";
 }
 
-TEST(LogAxis, OfOneValueEnclosesIt) {
+TEST(LogAxis, EnclosesASingleValue) {
   for (const double value : {0.0, 1.0, -2.0}) {
     const FigureAxis axis = log_axis(value, value, "");
     EXPECT_LT(axis.low, value);
@@ -125,7 +125,7 @@ TEST(DecadesAxis, EndsAtPowersOfTen) {
   EXPECT_EQ(decades_axis(1, 10, "error (m)").title, "error (m)");
 }
 
-TEST(NamesAxis, HasANameInTheMiddleOfEachSlot) {
+TEST(NamesAxis, PutsANameInEachSlotsMiddle) {
   const FigureAxis axis = names_axis({"cone", "cube", "plate"}, 2, "shape");
   EXPECT_TRUE(axis.names);
   EXPECT_FALSE(axis.grid);

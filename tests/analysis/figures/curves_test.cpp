@@ -38,7 +38,7 @@ Plan plan_of(std::size_t n_curves) {
   return plan;
 }
 
-TEST(PlanFigureCurves, HaveAShapeAndAColourEachAsTheLegendSays) {
+TEST(PlanFigureCurves, HaveTheShapesAndColoursOfTheLegend) {
   for (std::size_t n = 1; n <= 6; ++n) {
     const Figure figure = plan_figure(plan_of(n));
     ASSERT_EQ(figure.legend.size(), n);

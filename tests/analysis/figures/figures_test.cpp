@@ -72,7 +72,7 @@ StudyRecord record_of(const std::vector<std::pair<std::size_t, std::size_t>>& tr
   return record;
 }
 
-TEST(ServoFigure, DrawsThePercentOfTheTrialsInEachBin) {
+TEST(ServoFigure, DrawsThePercentOfTrialsInEachBin) {
   const Analysis analysis = analysis_of({"point", "ray"}, 2);
   const auto all = figures_of(analysis, record_of({{20, 3}, {23, 1}}));
   const Figure* servo = find(all, "servo");
@@ -110,7 +110,7 @@ TEST(ServoFigure, ReachesAsFarAsTheTrials) {
   EXPECT_NEAR(panel.x.high, std::log10(0.1) + 61 / 20.0, 1e-12);
 }
 
-TEST(ServoFigure, IsASentenceWhereThereIsNothingToDraw) {
+TEST(ServoFigure, IsASentenceWithNothingToDraw) {
   const Analysis human = analysis_of({"point", "ray"}, 2),
                  simulated = analysis_of({"point", "ray"}, 2, true);
   EXPECT_EQ(find(figures_of(human, {}), "servo"), nullptr);
@@ -166,7 +166,7 @@ TEST(Figures, SayWhatTheyLeaveOut) {
   EXPECT_EQ(two.subtitle, "2 participants, 4 trials");
 }
 
-TEST(Palette, HasAColourForEveryRoleAndAVariableOfItsNameForPages) {
+TEST(Palette, GivesEveryRoleAColourAndAVariable) {
   for (const Palette& palette : {light_palette(), dark_palette()}) {
     for (const std::string& colour : palette) {
       EXPECT_EQ(colour.size(), 7U) << colour;

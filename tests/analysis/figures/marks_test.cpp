@@ -63,7 +63,7 @@ TEST(Interval, IsCutAtTheAxisWithAnArrow) {
   for (std::size_t i = 1; i < 3; ++i) EXPECT_EQ(panel.marks[i].shape, MarkerShape::dash);
 }
 
-TEST(Interval, AcrossHasCapsOfTheSameLengthOrArrows) {
+TEST(Interval, AcrossHasEqualCapsOrArrows) {
   Panel panel = panel_of(-10, 10, 0, 40);
   add_interval_across(panel, Role::ink, 20, -4, 6, "t");
   ASSERT_EQ(panel.marks.size(), 3U);
@@ -88,7 +88,7 @@ TEST(Interval, AcrossHasCapsOfTheSameLengthOrArrows) {
   EXPECT_LT(panel.marks[2].dx, 0);
 }
 
-TEST(Outline, StaysWithinTheSymbolAndLooksAsItsName) {
+TEST(Outline, FitsTheSymbolAndLooksLikeItsName) {
   const auto right = outline_of(MarkerShape::right), left = outline_of(MarkerShape::left);
   ASSERT_EQ(right.size(), 3U);
   ASSERT_EQ(left.size(), 3U);
@@ -178,7 +178,7 @@ Mark label_at(double x, double y, const std::string& name) {
   return label;
 }
 
-TEST(Labels, StandBesideTheirPointOnTheRightWhereNothingIsInTheWay) {
+TEST(Labels, StandRightOfTheirPointUnlessBlocked) {
   Panel panel = panel_of(0, 10, 0, 10);
   panel.marks.push_back(label_at(5, 5, "cone"));
   const auto texts = placed_labels(panel, panel.width);
@@ -201,7 +201,7 @@ TEST(Labels, GoToTheLeftAtTheRightEnd) {
   EXPECT_EQ(placed_labels(panel, panel.width)[0].anchor, -1);
 }
 
-TEST(Labels, StayInThePanelEvenWhereAPointIsInTheWay) {
+TEST(Labels, StayInThePanelEvenWhenBlocked) {
   // At the right end, with a point where the label goes: beside that, not out of the panel.
   Panel panel = panel_of(0, 10, 0, 10);
   panel.marks.push_back(label_at(9.9, 5, "cylinder"));

@@ -138,7 +138,7 @@ TEST(TimesFigure, ADensityNeedsTwelveTimes) {
   EXPECT_TRUE(figure_of({{"ray", {}, {30}}}).panels.empty()) << "no times, no figure";
 }
 
-TEST(TimesFigure, WholeViolinsStandSideBySideWithMoreRenderers) {
+TEST(TimesFigure, MoreRenderersHaveWholeViolinsSideBySide) {
   const std::vector<double> times = peaked_times();
   const Figure figure = figure_of({{"a", times, {}}, {"b", times, {}}, {"c", times, {}}});
   const auto areas = marks_of(figure, Mark::Kind::area);
@@ -159,7 +159,7 @@ TEST(TimesFigure, WholeViolinsStandSideBySideWithMoreRenderers) {
   }
 }
 
-TEST(TimesFigure, LimitsHaveALineATickAndTheirTimeOuts) {
+TEST(TimesFigure, LimitsHaveLineTickAndTimeOuts) {
   const std::vector<double> times = peaked_times();
   const Figure figure = figure_of({{"point", times, {60, 60, 60}}, {"ray", times, {60}}});
   const Panel& panel = figure.panels[0];
@@ -187,7 +187,7 @@ TEST(TimesFigure, LimitsHaveALineATickAndTheirTimeOuts) {
   }
 }
 
-TEST(TimesFigure, OfManyLimitsTheFirstAndLastHaveALine) {
+TEST(TimesFigure, DrawsTheFirstAndLastOfManyLimits) {
   const auto drawn = [](const std::vector<double>& limits) {
     std::vector<double> seconds;
     for (const Mark& mark : marks_of(figure_of({{"point", {3, 4, 5}, limits}}), Mark::Kind::line)) {

@@ -25,7 +25,7 @@ TEST(RendererPairs, EachIsComparedWithTheFirst) {
   EXPECT_FALSE(renderer_pairs({"ray", "point"})[0].is_ray_minus_point());
 }
 
-TEST(RendererPairs, ASingleOneHasNoTrialsToCompareWith) {
+TEST(RendererPairs, ASingleRendererHasNothingToCompareWith) {
   const RendererPair ray = renderer_pairs({"ray"}).at(0), point = renderer_pairs({"point"}).at(0),
                      other = renderer_pairs({"tube"}).at(0);
   EXPECT_FALSE(ray.in_data());

@@ -52,7 +52,7 @@ TEST_F(TaskTrialsCsv, GivesEachTrialThatIsNotPractice) {
   EXPECT_TRUE(table.trials[1].answered);
 }
 
-TEST_F(TaskTrialsCsv, OfPracticeAloneIsRefused) {
+TEST_F(TaskTrialsCsv, RefusesPracticeAlone) {
   EXPECT_NE(refusal("P1,1,1,1,compare,softer,ray,cube,300,2,1,1\n")
                 .find("at least one trial that is not practice"),
             std::string::npos);
@@ -86,7 +86,7 @@ TEST_F(TaskTrialsCsv, AColumnThatComesTwiceIsRefused) {
   }
 }
 
-TEST_F(TaskTrialsCsv, TrialsStandInTheirOrderWhateverThatOfTheTable) {
+TEST_F(TaskTrialsCsv, OrdersTrialsWhateverTheOrderOfTheTable) {
   const StudyTable table = read(
       "P1,2,2,1,compare,softer,ray,cube,3,2,1,0\n"
       "P2,1,1,2,compare,softer,ray,cube,6,2,1,0\n"
@@ -98,7 +98,7 @@ TEST_F(TaskTrialsCsv, TrialsStandInTheirOrderWhateverThatOfTheTable) {
   EXPECT_EQ(levels, (std::vector<double>{1, 5, 2, 6, 3}));
 }
 
-TEST_F(TaskTrialsCsv, NAIsNoAnswerUnlessAStimulusHasThatName) {
+TEST_F(TaskTrialsCsv, NAIsMissingUnlessItNamesAStimulus) {
   const StudyTable table = read("P1,1,1,1,identify,which,ray,cube,,NA,0,0\n");
   EXPECT_EQ(table.trials[0].response, "");
   EXPECT_FALSE(table.trials[0].answered);
@@ -109,7 +109,7 @@ TEST_F(TaskTrialsCsv, NAIsNoAnswerUnlessAStimulusHasThatName) {
   EXPECT_TRUE(named.trials[0].answered);
 }
 
-TEST_F(TaskTrialsCsv, KnowsWhereRowsComeFromAndWhichAreOfTasks) {
+TEST_F(TaskTrialsCsv, KnowsSourcesOfRowsAndWhichAreTasks) {
   std::ofstream(path_)
       << "participant_id,task,renderer,shape,response,protocol_sha256,program_version\n"
          "P1,,ray,cube,cube,aaaaaa,0.1.0\n"

@@ -97,7 +97,7 @@ TEST_F(TrialsCsv, WarnsOfNamesThatLookAlike) {
                                       "Stimuli and answers 'cone' and 'Cone'" + end}));
 }
 
-TEST_F(TrialsCsv, SaysInHowManyTrialsTorqueWasLeftOut) {
+TEST_F(TrialsCsv, CountsTrialsWhoseTorqueWasLeftOut) {
   const std::string header = kHeader.substr(0, kHeader.size() - 1) + ",torque_driven\n";
   const std::string rows =
       "P1,1,1,1,ray,cube,cube,1,2.5,0\n"
@@ -111,7 +111,7 @@ TEST_F(TrialsCsv, SaysInHowManyTrialsTorqueWasLeftOut) {
                "0 or 1");
 }
 
-TEST_F(TrialsCsv, ToleratesByteOrderMarkCrlfQuotesAnyOrderAndNoLastNewline) {
+TEST_F(TrialsCsv, ToleratesByteMarksCrlfQuotesAndAnyOrder) {
   const TrialTable table = read(
       "\xEF\xBB\xBFresponse_time,note,correct,response,shape,renderer,trial,block,session,"
       "participant_id\r\n"
@@ -129,7 +129,7 @@ TEST_F(TrialsCsv, LinesAreCountedThroughQuotedNewlines) {
                "line 5, column response_time", "'fast'");
 }
 
-TEST_F(TrialsCsv, AnyRenderersPointAndRayFirstThenAsTheyAppear) {
+TEST_F(TrialsCsv, RenderersArePointRayThenAsTheyAppear) {
   const TrialTable table = read(kHeader +
                                 "P1,1,1,1,tube,cone,cone,1,1\n"
                                 "P1,1,1,2,ray,cone,cone,1,2\n"
@@ -175,7 +175,7 @@ TEST_F(TrialsCsv, RenderersAndCellsHaveALimit) {
   expect_fault(with(3, 7000, 200), "line 6871, column participant_id", "at most 4000000 cells");
 }
 
-TEST_F(TrialsCsv, LinesThatEndInCrAloneAreNamedAsSuch) {
+TEST_F(TrialsCsv, NamesLinesThatEndInCrAlone) {
   const auto with_cr = [](std::string text) {
     for (char& c : text) c = c == '\n' ? '\r' : c;
     return text;
@@ -194,7 +194,7 @@ TEST_F(TrialsCsv, LinesThatEndInCrAloneAreNamedAsSuch) {
   expect_fault(kHeader + row + "P1,1,1,2,ray,co\rne,cone,1,2\n", "line 3", words);
 }
 
-TEST_F(TrialsCsv, PracticeIsLeftOutAndOnlyAOneIsATimeOut) {
+TEST_F(TrialsCsv, OmitsPracticeAndOnlyOneMeansTimeOut) {
   const std::string header = kHeader.substr(0, kHeader.size() - 1) + ",practice,timed_out\n";
   const TrialTable table = read(header +
                                 "P1,1,1,1,ray,torus,torus,1,2,1,0\n"
@@ -207,7 +207,7 @@ TEST_F(TrialsCsv, PracticeIsLeftOutAndOnlyAOneIsATimeOut) {
   EXPECT_FALSE(table.rows[1].timed_out);
 }
 
-TEST_F(TrialsCsv, OwnShapesStandInTheOrderInWhichTheyAreShown) {
+TEST_F(TrialsCsv, OwnShapesStandInTheOrderShown) {
   const TrialTable table = read(kHeader +
                                 "P1,1,1,1,ray,torus,wedge,0,2\n"
                                 "P1,1,1,2,ray,prism,prism,1,2\n"
@@ -217,7 +217,7 @@ TEST_F(TrialsCsv, OwnShapesStandInTheOrderInWhichTheyAreShown) {
   EXPECT_EQ(table.answers.back(), "ring");
 }
 
-TEST_F(TrialsCsv, KnowsWhoIsSimulatedAndWhereRowsComeFrom) {
+TEST_F(TrialsCsv, KnowsSimulatedParticipantsAndSourcesOfRows) {
   const std::string header =
       kHeader.substr(0, kHeader.size() - 1) + ",simulated,protocol_sha256,program_version\n";
   const std::string one = "P1,1,1,1,ray,cone,cone,1,2,1,abc,0.1.0\n";
@@ -301,7 +301,7 @@ TEST_F(TrialsCsv, ManyFaultsAreListedThenCounted) {
   EXPECT_NE(found.back().expected.find("950 more"), std::string::npos);
 }
 
-TEST_F(TrialsCsv, TheSameRowsTwiceAreRefusedARepeatedPlaceIsWarnedOf) {
+TEST_F(TrialsCsv, RefusesRepeatedRowsAndWarnsOfRepeatedPlaces) {
   const std::string row = "P1,1,1,1,ray,cone,cone,1,2\n";
   expect_fault(kHeader + row + "\n" + row, "file", "1 row appears twice (lines 2 and 4)");
   const TrialTable repeated = read(kHeader + row + "P1,1,1,1,ray,cone,cone,1,2.5\n");
@@ -311,7 +311,7 @@ TEST_F(TrialsCsv, TheSameRowsTwiceAreRefusedARepeatedPlaceIsWarnedOf) {
   expect_fault(kHeader + row + late + late, "file", "(lines 3 and 4)");
 }
 
-TEST_F(TrialsCsv, TwoProtocolsMayHaveTheSamePlaceAndOneCanBeChosen) {
+TEST_F(TrialsCsv, ChoosesBetweenTwoProtocolsWithTheSamePlaces) {
   const std::string row = "P1,1,1,1,ray,cone,,0,60,";
   const std::string text = kHeader.substr(0, kHeader.size() - 1) + ",protocol_sha256\n" + row +
                            "aaaaaa11\n" + row + "bbbbbb22\nP1,1,1,2,ray,cube,cube,1,2,bbbbbb22\n";
@@ -329,7 +329,7 @@ TEST_F(TrialsCsv, TwoProtocolsMayHaveTheSamePlaceAndOneCanBeChosen) {
   EXPECT_THROW(read_trials_csv(path_, "aaaaaa"), protocols::InputError);
 }
 
-TEST_F(TrialsCsv, AStimulusMayHaveTheNameOfAMissingValue) {
+TEST_F(TrialsCsv, StimuliMayBeNamedLikeMissingValues) {
   const std::string header = kHeader.substr(0, kHeader.size() - 1) + ",timed_out\n";
   const TrialTable table = read(header +
                                 "P1,1,1,1,ray,cone,NA,0,2,0\n"
@@ -359,7 +359,7 @@ TEST_F(TrialsCsv, ShapesCanBePutInAnotherOrder) {
 }
 
 // Ten are named, of more how many they are.
-TEST_F(TrialsCsv, NamesTenRowsThatRepeatOthersAndCountsTheRest) {
+TEST_F(TrialsCsv, NamesTenRepeatedRowsAndCountsTheRest) {
   for (const int repeats : {1, 9, 10, 11, 13}) {
     std::string text = kHeader;
     for (int i = 1; i <= repeats; ++i) {
@@ -423,7 +423,7 @@ TEST_F(TrialsCsv, RowsFlowThroughTheBuffersBlocks) {
   }
 }
 
-TEST_F(TrialsCsv, ABlockMayEndAnywhereInAQuotedRecord) {
+TEST_F(TrialsCsv, BlocksMayEndAnywhereInQuotedRecords) {
   constexpr int kRows = 6000;  // some two blocks
   const std::string note = "\"a \"\"b\"\"\nc\"";
   for (std::size_t pad = 0; pad < 60; ++pad) {  // more than a record: every byte is last once

@@ -85,7 +85,7 @@ TEST_F(TrialsStore, ReadsCompletedTrials) {
   EXPECT_EQ(table.provenance.program_versions, (std::vector<std::string>{"9.9.9"}));
 }
 
-TEST_F(TrialsStore, SaysInHowManyTrialsTorqueWasLeftOut) {
+TEST_F(TrialsStore, CountsTrialsWhoseTorqueWasLeftOut) {
   study({trial(1, "ray", "torus", "torus"), trial(2, "ray", "cube", "cube"),
          trial(3, "point", "wedge", "wedge")},
         "{}", data::kTorqueLeftOutNote);
@@ -96,7 +96,7 @@ TEST_F(TrialsStore, SaysInHowManyTrialsTorqueWasLeftOut) {
   EXPECT_EQ(read_study_store(store).times->warnings, read_trials_store(store).warnings);
 }
 
-TEST_F(TrialsStore, TheRecordHasTheServoOfEachRendererWithoutPractice) {
+TEST_F(TrialsStore, RecordsEachRenderersServoWithoutPractice) {
   auto first = trial(1, "ray", "cube", "cube"), second = trial(2, "ray", "cube", "cube"),
        third = trial(3, "ray", "cube", "cube"), point = trial(4, "point", "cube", "cube"),
        practice = trial(5, "ray", "cube", "cube");
@@ -149,7 +149,7 @@ TEST_F(TrialsStore, TheRecordHasTheServoOfEachRendererWithoutPractice) {
   EXPECT_EQ(record.n_cut_off, 0U);
 }
 
-TEST_F(TrialsStore, PeriodsBeyondTheBinsAreInTheLastOnes) {
+TEST_F(TrialsStore, PeriodsBeyondTheBinsCountInTheLast) {
   auto shortest = trial(1, "ray", "cube", "cube"), longest = trial(2, "ray", "cube", "cube");
   shortest.longest_period_ns = 10;
   longest.longest_period_ns = 3'600'000'000'000;  // an hour

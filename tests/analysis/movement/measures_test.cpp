@@ -143,7 +143,7 @@ TEST(Smoothness, MovementsLastLongEnough) {
   EXPECT_EQ(movements(speed, 1000), (std::vector<Stretch>{{100, 200}}));
 }
 
-TEST(Signal, TheFilterIsDownByThreeDecibelAtTheCutOff) {
+TEST(Signal, FilterLosesThreeDecibelAtTheCutOff) {
   std::vector<double> wave;
   for (int i = 0; i < 8000; ++i) wave.push_back(std::sin(2 * kPi * 20 * i / 1000.0));
   const std::vector<double> passed = low_pass(wave, 1000, 20);
@@ -153,7 +153,7 @@ TEST(Signal, TheFilterIsDownByThreeDecibelAtTheCutOff) {
   for (const double v : low_pass(std::vector<double>(30, 2.5), 1000, 20)) EXPECT_NEAR(v, 2.5, 1e-9);
 }
 
-TEST(Signal, NoiseAddsItsPathAndTheFilterTakesItAway) {
+TEST(Signal, FilterRemovesThePathThatNoiseAdds) {
   constexpr std::uint64_t kSeed = 7;
   Random random(kSeed);
   std::vector<Vec3> rest;
@@ -178,7 +178,7 @@ TEST(Contacts, EpisodesJoinShortGapsAndDropTouches) {
             (std::vector<Stretch>{{100, 200}, {250, 300}, {700, 720}}));
 }
 
-TEST(Contacts, ACircleIsOneStrokeAndToAndFroAreTwo) {
+TEST(Contacts, CircleIsOneStrokeToAndFroTwo) {
   const std::vector<bool> all(1000, true);
   EXPECT_EQ(strokes(all, {}, circle(3 * kPi, 0.02, 1000), 1000), 1U);
   std::vector<Vec3> back;
@@ -208,7 +208,7 @@ TEST(Contacts, ProceduresAreToldBySpeedForceAndEdge) {
   EXPECT_EQ(window(0.001, 1, 1.2, false), Procedure::stationary);
 }
 
-TEST(Coverage, ASphereIsCoveredByACapAndABand) {
+TEST(Coverage, CapAndBandCoverTheirShares) {
   const TouchedSurface surface(draw_places(sphere(0.03), TouchedSurface::kPlaces));
   EXPECT_NEAR(surface.coverage({{0, 0, 0.03}}).back(), 25.0 / 3600, 0.003);
   EXPECT_NEAR(surface.coverage(circle(2 * kPi, 0.03, 2000)).back(),
@@ -368,7 +368,7 @@ TEST(Pictures, EvenContactIsOneOnTheWholeMap) {
   EXPECT_EQ(curve.median_duration, 10);
 }
 
-TEST(Pictures, TheTypicalTrialIsARightOneNearTheMedian) {
+TEST(Pictures, TypicalTrialIsCorrectAndNearTheMedian) {
   MovementTable table;
   table.trials.participants = {"P1"};
   table.trials.renderers = {"point"};

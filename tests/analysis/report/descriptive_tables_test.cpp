@@ -114,7 +114,7 @@ TEST(DescriptiveTables, CountsAreOfAllTrialsWithoutPractice) {
   EXPECT_NEAR(counts.accuracy.value(), 12.0 / 17, 1e-15);
 }
 
-TEST(DescriptiveTables, TimeOutsNameTheLimitAndTheParticipantWithMost) {
+TEST(DescriptiveTables, TimeOutsNameLimitAndParticipantWithMost) {
   EXPECT_EQ(time_outs_table(two_participants()).rows,
             (Rows{{"cone", "point", "6", "1", "16.7 %", "60 s", "20.0 % (A)"},
                   {"cone", "ray", "5", "0", "0.0 %", "–", "–"},
@@ -223,7 +223,7 @@ std::vector<std::string> lines_of_report(const Analysis& analysis) {
   return lines;
 }
 
-TEST(TextReport, HasEveryRowOfTheTablesWithItsFieldsApart) {
+TEST(TextReport, SeparatesTheFieldsOfEveryTableRow) {
   const Analysis analysis = two_participants();
   const auto lines = lines_of_report(analysis);
   for (const Table& table :
@@ -241,7 +241,7 @@ TEST(TextReport, HasEveryRowOfTheTablesWithItsFieldsApart) {
             lines.end());
 }
 
-TEST(TextReport, SplitsAWideTableIntoColumnsThatRepeatTheNames) {
+TEST(TextReport, SplitsWideTablesAndRepeatsTheNames) {
   Study study;
   Row shapes;
   for (int s = 0; s < 16; ++s) shapes.push_back("object" + std::to_string(s));

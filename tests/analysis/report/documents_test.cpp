@@ -83,11 +83,11 @@ void expect_named(const Json& value, const std::string& path) {
   }
 }
 
-TEST(Documents, EveryNumberOfTheJsonHasANameAndEveryTextWords) {
+TEST(Documents, JsonNumbersHaveNamesAndTextsHaveWords) {
   for (const Analysis& analysis : studies()) expect_named(Json::parse(report_json(analysis)), "");
 }
 
-TEST(Documents, TablesHaveACaptionANameForEachColumnAndNoEmptyNote) {
+TEST(Documents, TablesHaveCaptionsNamedColumnsNoEmptyNotes) {
   for (const Analysis& analysis : studies()) {
     for (const Table& table : all_tables(analysis)) {
       EXPECT_NE(table.caption, "");
@@ -102,7 +102,7 @@ TEST(Documents, TablesHaveACaptionANameForEachColumnAndNoEmptyNote) {
   }
 }
 
-TEST(Documents, NamesStandInTheFirstColumnsOfATableNumbersInTheOthers) {
+TEST(Documents, TablesPutNamesBeforeNumbers) {
   const auto number = [](const std::string& cell) {
     return cell.find_first_of("0123456789") != std::string::npos;
   };
@@ -125,7 +125,7 @@ TEST(Documents, NamesStandInTheFirstColumnsOfATableNumbersInTheOthers) {
   }
 }
 
-TEST(Documents, AxesOfNumbersSayWhatTheyShowAxesOfNamesNeedNot) {
+TEST(Documents, AxesOfNumbersSayWhatTheyShow) {
   for (const Analysis& analysis : studies()) {
     const std::vector<Figure> figures = figures_of(analysis, {});
     EXPECT_GE(figures.size(), 7U);
@@ -282,7 +282,7 @@ TEST(Documents, CardsHaveTheNumbersOfTheStatistics) {
   EXPECT_GT(with_time_outs, 4);
 }
 
-TEST(Documents, TheAnovasTablePrintsEachCorrectionUnderItsName) {
+TEST(Documents, AnovaTablePrintsEachCorrectionUnderItsName) {
   for (const Analysis& analysis : studies()) {
     const Table table = anova_table(analysis);
     ASSERT_EQ(table.rows.size(), analysis.rm_anova.effects.size());

@@ -195,7 +195,7 @@ TEST(Quotable, SentencesHaveTestsAndTurnWithTheirDirection) {
   EXPECT_EQ(sentences_to_quote(analysis).size(), 1U) << "an undefined test has no sentence";
 }
 
-TEST(HtmlPage, LinksItsSectionsAndAllowsItsOwnScriptOnly) {
+TEST(HtmlPage, LinksSectionsAndAllowsOnlyItsOwnScript) {
   HtmlPage page("The ray is faster for 2 %", "SIMULATED");
   page.put_banner("simulated <all>");
   page.above_title() += "<p>above</p>";

@@ -78,7 +78,7 @@ TEST(Hypotheses, NumbersThatWereUsedAreTold) {
   EXPECT_TRUE(std::isnan(judgement.numbers[2].second));
 }
 
-TEST(Hypotheses, ANameThatTheAnalysisDoesNotHaveIsRefused) {
+TEST(Hypotheses, RefusesNamesUnknownToTheAnalysis) {
   const std::string said = faults_of(
       R"([{"id": "H1", "text": "t", "corroborated": "paired.cone.p_hol < 0.05", "refuted": "paired.cube.p > 1"}])",
       named_results(kAnalysis, 0.05));

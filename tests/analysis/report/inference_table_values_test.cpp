@@ -283,7 +283,7 @@ TEST(SpeedAccuracyTableValues, ChangesArePairedOverParticipants) {
   }
 }
 
-TEST(LearningTableValues, BinsAreEighthsOfTheTrialsWithARenderer) {
+TEST(LearningTableValues, BinsAreEighthsOfEachRenderersTrials) {
   const Study study({"point", "ray"});
   const Table table = learning_table(study.analysis());
   EXPECT_EQ(table.header, (std::vector<std::string>{"renderer", "1/8", "2/8", "3/8", "4/8", "5/8",

@@ -294,7 +294,7 @@ TEST(PlanFigure, DrawsThePowerOfEveryPoint) {
   EXPECT_NE(figure.description.find("12 participants are enough."), std::string::npos);
 }
 
-TEST(PlanFigure, HasAnAxisForOneNumberAndForManyDecades) {
+TEST(PlanFigure, HasAxesForOneNumberAndManyDecades) {
   Plan plan = a_plan();
   plan.label = "SIMULATED PARTICIPANTS";
   plan.settings.min_participants = plan.settings.max_participants = 8;

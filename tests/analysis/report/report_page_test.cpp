@@ -114,7 +114,7 @@ TEST(ReportPage, CutsLongListsOfSeeds) {
   EXPECT_EQ(page.find("seed500"), std::string::npos);
 }
 
-TEST(ReportPage, TableOfTheServoHasEachNumberUnderItsName) {
+TEST(ReportPage, ServoTableHasEachNumberUnderItsName) {
   StudyRecord record;
   ServoQuality& servo = record.servo.emplace_back();
   servo.renderer = "point";
@@ -157,7 +157,7 @@ TEST(ReportPage, TableOfTheServoHasEachNumberUnderItsName) {
   EXPECT_NE(page.find("1 attempt was interrupted and repeated."), std::string::npos);
 }
 
-TEST(ReportPage, LinksEachSectionInTheOrderOfThePage) {
+TEST(ReportPage, LinksSectionsInTheOrderOfThePage) {
   const std::string page = report_html(small_analysis(), {});
   std::size_t link = 0, section = 0;
   for (const char* id : {"figure15", "speedup", "times", "confusion", "speed-accuracy", "learning",

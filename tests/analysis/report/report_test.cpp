@@ -165,7 +165,7 @@ TEST(Text, WarnsOfExclusions) {
   EXPECT_FALSE(holds(text, "of the trials with point are excluded"));
 }
 
-TEST(Reports, SayTimeOutsByCellAndLeaveThemOutWhereThereAreNone) {
+TEST(Reports, NameTimeOutsOfCellsThatHaveAny) {
   Study study;
   study.lost_with_ray = 0.3;
   const Analysis lost = analysis_of_study(study), none = analysis_of_study({});
@@ -194,7 +194,7 @@ TEST(Reports, SayTimeOutsByCellAndLeaveThemOutWhereThereAreNone) {
   EXPECT_EQ(with["paired_by_shape"]["cone"]["censored"]["status"], "ok");
 }
 
-TEST(Figures, EndAViolinAtTheLimitAndSayHowManyEndedThere) {
+TEST(Figures, EndViolinsAtLimitsAndCountTimeOuts) {
   Study study;
   study.lost_with_ray = 0.2;
   study.repetitions = 20;
@@ -228,7 +228,7 @@ StudyRecord servo_record(const std::vector<std::size_t>& bins) {
   return record;
 }
 
-TEST(Figures, OfTheServoAreLeftOutWhereEveryTrialIsAlike) {
+TEST(Figures, OmitTheServoWhereEveryTrialIsAlike) {
   Study study;
   study.simulated = Simulated::yes;
   const Analysis analysis = analysis_of_study(study);
@@ -242,7 +242,7 @@ TEST(Figures, OfTheServoAreLeftOutWhereEveryTrialIsAlike) {
   EXPECT_TRUE(holds(text, "virtual clock"));
 }
 
-TEST(Cards, NameBothWhereTheAdjustedPAndTheIntervalDisagree) {
+TEST(Cards, NameAdjustedPAndIntervalWhereTheyDisagree) {
   Analysis analysis = analysis_of_study({});
   PairedShape& cone = analysis.comparisons[0].shapes[1];
   cone.t_test.p = 0.03;

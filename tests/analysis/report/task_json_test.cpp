@@ -100,7 +100,7 @@ TEST(TaskJson, AFunctionWithEverything) {
   EXPECT_EQ(found, expected);
 }
 
-TEST(TaskJson, WhatIsNotDefinedSaysWhyAndInfiniteEndsAreNull) {
+TEST(TaskJson, UndefinedValuesSayWhyInfiniteEndsAreNull) {
   TaskCell cell = named_cell("detect", "", "", "");
   cell.functions = {full_function("B")};
   ParticipantFunction& one = cell.functions[0];

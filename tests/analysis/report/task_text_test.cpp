@@ -274,7 +274,7 @@ TEST(TaskText, CellsOfNumbersSettingsAnswersAndConfidence) {
   EXPECT_NE(text_of_cell(named).find("few trials 0 bit"), std::string::npos);
 }
 
-TEST(TaskText, ATableThatSaysNothingOfItsScaleIsPointedOut) {
+TEST(TaskText, PointsOutTablesWithoutAScale) {
   const std::string note =
       "A table does not contain the scale of an adaptive procedure's levels: if it "
       "is\nlogarithmic, give --scale log.\n";

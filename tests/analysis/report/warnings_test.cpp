@@ -46,7 +46,7 @@ bool has(const Analysis& analysis, const std::string& warning) {
   return std::ranges::count(analysis.warnings, warning) == 1;
 }
 
-TEST(Warnings, OfTwoRenderersInOneOrderForAll) {
+TEST(Warnings, NameTwoRenderersInOneOrderForAll) {
   EXPECT_TRUE(has(analysis_in(
                       [](int) {
                         return Names{"point", "ray"};
@@ -71,7 +71,7 @@ TEST(Warnings, OfTwoRenderersInOneOrderForAll) {
   })) << "one participant with the other order";
 }
 
-TEST(Warnings, OfThreeRenderersNameBoth) {
+TEST(Warnings, NameBothRenderersWhereThereAreThree) {
   const Analysis analysis = analysis_in(
       [](int p) {
         return p % 2 == 0 ? Names{"point", "ray", "other"} : Names{"other", "point", "ray"};
@@ -83,7 +83,7 @@ TEST(Warnings, OfThreeRenderersNameBoth) {
           "confounded."));
 }
 
-TEST(Warnings, OfAGainThatDependsOnWhichCameFirst) {
+TEST(Warnings, NameGainsThatDependOnWhichCameFirst) {
   // Whoever comes second is twice as fast; the gain itself is nothing.
   const auto half = [](int p) {
     return p % 2 == 0 ? Names{"point", "ray"} : Names{"ray", "point"};
@@ -104,7 +104,7 @@ TEST(Warnings, OfAGainThatDependsOnWhichCameFirst) {
   }));
 }
 
-TEST(Warnings, OfTimesThatAreHardlySeconds) {
+TEST(Warnings, NameTimesThatAreHardlySeconds) {
   const std::string wanted =
       "A mean response time is longer than 10 minutes: are the times in seconds?";
   const auto order = [](int p) {

@@ -122,7 +122,7 @@ std::vector<Row> simulated(Random& random, int participants, int trials, double 
   return rows;
 }
 
-TEST(Censored, IsAtTheTopOfTheLikelihoodWrittenOut) {
+TEST(Censored, MaximizesTheLikelihoodWrittenOut) {
   for (const std::uint64_t seed : {3, 4, 5}) {
     Random random(seed);
     const auto rows = simulated(random, 4, 9, -0.4, 0.1, 30);
@@ -178,7 +178,7 @@ TEST(Censored, IsAtTheTopOfTheLikelihoodWrittenOut) {
   }
 }
 
-TEST(Censored, IsThePairedTTestWhereNobodyTimesOutAndAllHaveAsManyTrials) {
+TEST(Censored, EqualsPairedTTestIfBalancedAndUncensored) {
   constexpr std::uint64_t kSeed = 8;
   Random random(kSeed);
   const TrialTable table = table_of(simulated(random, 6, 5, -0.3, 0.2, 1e9));
@@ -193,7 +193,7 @@ TEST(Censored, IsThePairedTTestWhereNobodyTimesOutAndAllHaveAsManyTrials) {
   EXPECT_NEAR(found.log_ratio_ci95->high, paired.t_test.log_ratio_ci95->high, 1e-8);
 }
 
-TEST(Censored, HoldsItsIntervalWhereThePrimaryOneLeavesTheTruth) {
+TEST(Censored, IntervalHoldsTruthWhereThePrimaryDoesNot) {
   // 7 participants, gain 0.4 with sd 0.1; a fifth of the trials with the point are time-outs.
   constexpr double kGain = -0.4;
   constexpr int kStudies = 1000;
@@ -221,7 +221,7 @@ TEST(Censored, HoldsItsIntervalWhereThePrimaryOneLeavesTheTruth) {
   }
 }
 
-TEST(Censored, TakesTheParticipantWhoNeverAnswersInTimeWithOneRenderer) {
+TEST(Censored, TakesParticipantsAlwaysLateWithOneRenderer) {
   constexpr std::uint64_t kSeed = 12;
   Random random(kSeed);
   auto rows = simulated(random, 4, 6, -0.3, 0.1, 60);

@@ -237,7 +237,7 @@ TEST(Answer, HasASentenceForEachComparison) {
   EXPECT_FALSE(compares_as_paper(analysis));
 }
 
-TEST(SpeedAccuracy, ReadsSlowerAndBetterAsATradeOffToo) {
+TEST(SpeedAccuracy, SlowerAndBetterIsATradeOffToo) {
   const Analysis analysis = analysis_with(3, 10, [](int p, int i, StudyTrial& trial) {
     if (trial.renderer == "ray") trial.response_time = 6;
     if (trial.renderer == "point" && i < 2 + p) answer_wrongly(trial);
@@ -262,7 +262,7 @@ TEST(Learning, DiffersBetweenRenderersAsRayLessPoint) {
   EXPECT_NEAR(*analysis.practice.learning[1].bins[0].se_mean_log, 0.14 / std::sqrt(3.0), 1e-9);
 }
 
-TEST(RendererOrder, OfAllShapesTakesWhoHasThemAll) {
+TEST(RendererOrder, AllShapesCountOnlyWhoHasThemAll) {
   const Analysis analysis = analysis_with(
       4, 3, [](int p, int, StudyTrial& trial) { return p != 3 || trial.shape == "cone"; });
   const auto of = [&](const OrderEffect& effect) { return effect.reference_first.n_participants; };
@@ -304,7 +304,7 @@ TEST(SingularFit, IsNamedByWhatDoesNotVary) {
             "a correlation of +1 between participants' effects");
 }
 
-TEST(Power, CountsOnlyWhatIsFoundTheRightWayRound) {
+TEST(Power, CountsOnlyEffectsInTheRightDirection) {
   StudyModel model;
   model.shapes = {"cone"};
   model.log_ratios = {-1e-9};
@@ -315,7 +315,7 @@ TEST(Power, CountsOnlyWhatIsFoundTheRightWayRound) {
   EXPECT_NEAR(power.proportion(power.found[0]), 0.025, 0.006) << "half of alpha";
 }
 
-TEST(Power, OfAllShapesIsLessThanOfAny) {
+TEST(Power, AllShapesHaveLessPowerThanAny) {
   StudyModel model;
   model.shapes = {"sphere", "cone"};
   model.gain_sd = 0.2;
@@ -330,7 +330,7 @@ TEST(Power, OfAllShapesIsLessThanOfAny) {
   }
 }
 
-TEST(Power, OfTheModelWithoutParticipantsVarianceIsThatOfTheTrials) {
+TEST(Power, ModelEqualsTrialsWithoutParticipantsVariance) {
   StudyModel model;
   model.shapes = {"cone"};
   model.log_ratios = {-0.13};
@@ -353,7 +353,7 @@ TEST(Plan, AsksForTheGoalThatIsSet) {
   EXPECT_EQ(goal_power(plan, power), 0.9);
 }
 
-TEST(Pilot, LeavesOutOfTheShareWhatIsTooFast) {
+TEST(Pilot, LeavesTooFastTrialsOutOfTheShare) {
   const Analysis analysis = analysis_with(4, 8, [](int p, int i, StudyTrial& trial) {
     trial.response_time = std::exp(2 + 0.1 * p + 0.1 * ((i * i + p) % 5) +
                                    (trial.renderer == "ray" ? 0.07 * (p % 3) : 0));

@@ -70,7 +70,7 @@ TEST(Describe, NothingAnsweredLeavesNoShareOfIt) {
   EXPECT_FALSE(found.times[0][0].mean_of_participant_means.has_value());
 }
 
-TEST(Median, OfEvenCountsIsBetweenTheMiddleTwo) {
+TEST(Median, LiesBetweenTheMiddleTwoOfEvenCounts) {
   std::vector<double> four{9, 1, 4, 2}, three{9, 1, 4}, one{7};
   EXPECT_EQ(median(four), 3);
   EXPECT_EQ(median(three), 4);

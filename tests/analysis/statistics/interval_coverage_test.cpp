@@ -14,7 +14,7 @@
 namespace palpate::analysis {
 namespace {
 
-TEST(IntervalCoverage, DesignsAreOfEveryProcedureWithTheModelsOfAnalyze) {
+TEST(IntervalCoverage, DesignsCoverEveryProcedureWithAnalyzesModels) {
   const auto designs = coverage_designs({0, 0.05});
   std::set<std::string> tasks;
   std::set<std::size_t> kinds;
@@ -32,7 +32,7 @@ TEST(IntervalCoverage, DesignsAreOfEveryProcedureWithTheModelsOfAnalyze) {
   EXPECT_EQ(kinds, (std::set<std::size_t>{0, 1, 2, 3})) << "constant, staircase, QUEST+, limits";
 }
 
-TEST(IntervalCoverage, IsTheSameOfOneJobAndOfThree) {
+TEST(IntervalCoverage, IsTheSameForOneAndThreeJobs) {
   CoverageSettings settings;
   settings.lapses = {0.05};
   settings.studies = 4;

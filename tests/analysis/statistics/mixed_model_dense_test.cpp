@@ -190,7 +190,7 @@ TEST(MixedModelByDefinition, ABalancedStudyIsFittedAsDefined) {
       6, 3, [](auto...) { return 3; }, 1));
 }
 
-TEST(MixedModelByDefinition, AnUnbalancedStudyWithGapsIsFittedAsDefined) {
+TEST(MixedModelByDefinition, FitsUnbalancedStudiesWithGapsAsDefined) {
   expect_by_definition(dense_study(
       8, 3, [](std::size_t p, std::size_t r, std::size_t s) { return (p * p + 3 * r + 2 * s) % 4; },
       2));

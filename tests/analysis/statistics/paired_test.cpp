@@ -36,7 +36,7 @@ TEST(Undefined, NoPairsAndOnePair) {
   }
 }
 
-TEST(Wilcoxon, OfOnePairIsDefinedAndSaysNothing) {
+TEST(Wilcoxon, OnePairIsDefinedAndSaysNothing) {
   EXPECT_NE(wilcoxon({}).undefined, "");
   EXPECT_FALSE(wilcoxon({}).p.has_value());
   for (const double d : {-0.3, 0.2}) {
@@ -49,7 +49,7 @@ TEST(Wilcoxon, OfOnePairIsDefinedAndSaysNothing) {
   EXPECT_EQ(wilcoxon({0}).undefined, "every difference is zero");
 }
 
-TEST(Undefined, TwoPairsHaveADzButNoHedgesG) {
+TEST(Undefined, TwoPairsHaveDzButNoHedgesG) {
   const EffectSize effect = effect_size({-0.1, -0.3});
   EXPECT_FALSE(effect.undefined.empty());
   EXPECT_NEAR(effect.dz.value(), -std::sqrt(2.0), 1e-12);
@@ -85,7 +85,7 @@ TEST(Holm, LeavesOutWhatHasNoP) {
   EXPECT_DOUBLE_EQ(adjusted[4].value(), 0.9);
 }
 
-TEST(PercentReduction, PositiveWhenTheRayIsFasterAndEndsSwap) {
+TEST(PercentReduction, PositiveWhenRayIsFasterAndEndsSwap) {
   EXPECT_NEAR(percent_reduction(std::log(0.78)), 22, 1e-12);
   const Interval percent = percent_reduction(Interval{std::log(0.5), std::log(1.1)});
   EXPECT_NEAR(percent.low, -10, 1e-12);
@@ -112,7 +112,7 @@ TEST(Properties, SignsFlipTogether) {
   }
 }
 
-TEST(Wilcoxon, TheApproximationBeyondTheLimitMeetsTheExactP) {
+TEST(Wilcoxon, ApproximationBeyondTheLimitMeetsTheExactP) {
   constexpr std::uint64_t kSeed = 4;
   Random random(kSeed);
   std::vector<double> d;

@@ -65,7 +65,7 @@ TEST(Pattern, AndBindsTighterThanOr) {
 }
 
 // What an undefined figure cannot change is known all the same.
-TEST(Pattern, UndefinedValuesLeaveItUndefinedOnlyWhereTheyCount) {
+TEST(Pattern, UndefinedValuesMatterOnlyWhereTheyCount) {
   for (const char* unknown :
        {"none > 5", "!(none > 5)", "none > 5 && cone > 5", "none > 5 || cone < 5", "none == none",
         "min(cone, none) > 0", "max(none, cone) > 0", "none * 0 == 0", "abs(none) >= 0"}) {

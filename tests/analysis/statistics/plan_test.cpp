@@ -43,7 +43,7 @@ PowerSettings settings_of(std::size_t studies) {
   return settings;
 }
 
-TEST(Power, OfOneShapeIsThatOfTheTTest) {
+TEST(Power, OneShapeEqualsTheTTest) {
   // R: power.t.test(n, delta, sd, type = "one.sample", strict = TRUE); sd^2 = gain_sd^2 +
   // shape_gain_sd^2 + 2 residual_sd^2 / trials.
   const Power first =
@@ -55,7 +55,7 @@ TEST(Power, OfOneShapeIsThatOfTheTTest) {
   EXPECT_NEAR(second.proportion(second.found[0]), 0.199626, 0.01);
 }
 
-TEST(Power, TellsHowManyStudiesAreDoneUpToTheLast) {
+TEST(Power, TellsProgressUpToTheLastStudy) {
   std::vector<std::size_t> told;
   PowerSettings settings = settings_of(1'000);
   settings.progress = [&](std::size_t done) { told.push_back(done); };
@@ -67,7 +67,7 @@ TEST(Power, TellsHowManyStudiesAreDoneUpToTheLast) {
   EXPECT_EQ(told.back(), 1'000U);
 }
 
-TEST(Power, WithoutEffectsTheFamilyErrsAsOftenAsAlphaSays) {
+TEST(Power, FamilyErrsAtRateAlphaWithoutEffects) {
   const Power power =
       simulate_power(model_of(0, 0.2, 0.4, {0, 0, 0, 0}), {8, 10}, settings_of(20'000));
   double sum = 0;
@@ -78,7 +78,7 @@ TEST(Power, WithoutEffectsTheFamilyErrsAsOftenAsAlphaSays) {
   EXPECT_EQ(power.any, 0U);
 }
 
-TEST(Power, TrialsWithoutATimeCountAsIfTheyWereNotThere) {
+TEST(Power, TrialsWithoutATimeDoNotCount) {
   StudyModel model = model_of(0, 0, 0.4, {-0.1});
   const Power half = simulate_power(model, {10, 40}, settings_of(20'000));
   model.proportion_used = 0.5;
@@ -103,7 +103,7 @@ TEST(Power, IsTheSameWhateverTheJobs) {
   }
 }
 
-TEST(Power, OfTheModelIsThatOfThePairedTestsWhereItsVariancesAreAll) {
+TEST(Power, ModelEqualsPairedTestsWithoutExtraVariance) {
   const StudyModel model = model_of(0.1, 0, 0.4, {-0.25, -0.25});
   PowerSettings settings = settings_of(300);
   const Power paired = simulate_power(model, {12, 20}, settings);
@@ -251,7 +251,7 @@ Analysis uneven_pilot(bool one_more, const std::string& missing_with = "ray") {
 }
 
 // A participant without a cell has no gain for that shape and does not enter the variance of gains.
-TEST(Pilot, TheGainsOfShapesAreThoseOfParticipantsWithEveryCell) {
+TEST(Pilot, GainsOfShapesUseParticipantsWithEveryCell) {
   const Pilot complete = read_pilot(uneven_pilot(false));
   ASSERT_EQ(complete.undefined, "");
   EXPECT_GT(complete.model.shape_gain_sd, 0.1);

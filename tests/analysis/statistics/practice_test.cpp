@@ -154,7 +154,7 @@ Analysis study_without_learning(Random& random) {
   return analyze(builder.finish({}), {}, "test");
 }
 
-TEST(Learning, IsNoVerdictAndPracticeIsOneFamilyOfTests) {
+TEST(Learning, GivesNoVerdictAndPracticeIsOneFamily) {
   for (const std::uint64_t seed : {41, 42}) {
     Random random(seed);
     constexpr int kStudies = 400;

@@ -165,7 +165,7 @@ TEST(PsychometricFit, QuickRefitsGiveTheGoodnessOfWholeOnes) {
   }
 }
 
-TEST(PsychometricFit, DevianceOfARightModelHasAnEvenPAndOfAWrongOneASmall) {
+TEST(PsychometricFit, DeviancePIsUniformExceptForWrongModels) {
   constexpr std::uint64_t kSeed = 4;
   Random random(kSeed);
   int below_fifth = 0;

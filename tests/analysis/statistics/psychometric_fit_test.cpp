@@ -165,7 +165,7 @@ TEST(PsychometricFit, SaysWhereThereIsNone) {
   EXPECT_EQ(fit_psychometric({{1, 9, 9}, {2, 9, 9}}, {}).undefined, "no failure at any level");
 }
 
-TEST(PsychometricFit, AStepHasASlopeAtItsBoundAndAThresholdBetween) {
+TEST(PsychometricFit, StepHasSlopeAtBoundAndThresholdBetween) {
   const PsychometricFit fit = fit_psychometric({{1, 9, 0}, {2, 9, 0}, {3, 9, 9}, {4, 9, 9}}, {});
   EXPECT_GT(fit.parameters.threshold, 2);
   EXPECT_LT(fit.parameters.threshold, 3);
@@ -218,7 +218,7 @@ double log_likelihood_of(const std::vector<LevelCount>& counts, double threshold
   return sum;
 }
 
-TEST(PsychometricFit, OneRateAtBothEndsIsTheBestOfAGrid) {
+TEST(PsychometricFit, OneRateAtBothEndsBeatsAGrid) {
   const std::vector<LevelCount> counts{{-3, 80, 7}, {-2, 80, 8}, {-1, 80, 18}, {0, 80, 42},
                                        {1, 80, 66}, {2, 80, 72}, {3, 80, 74}};
   PsychometricModel model;
@@ -256,7 +256,7 @@ TEST(PsychometricFit, OneRateAtBothEndsIsTheBestOfAGrid) {
   EXPECT_NEAR(rate_low, fit.log_likelihood - half_chi_squared, 5e-3);
 }
 
-TEST(PsychometricFit, NoThresholdOfLevelsAboveZeroIsBelowIt) {
+TEST(PsychometricFit, PositiveLevelsHaveNoThresholdBelowZero) {
   // Nearly always right: where guessing turns into certainty, nobody knows.
   PsychometricModel model;
   model.guess.value = 0.5;
@@ -319,7 +319,7 @@ TEST(PsychometricFit, ARateHasAnIntervalWithinItsLimits) {
   EXPECT_EQ(few.guess_ci95.high, 0.5);
 }
 
-TEST(PsychometricFit, AThresholdOutsideTheLevelsHasAnOpenInterval) {
+TEST(PsychometricFit, ThresholdsOutsideTheLevelsHaveOpenIntervals) {
   // Hardly anything above chance: how far the threshold is away, nobody knows.
   PsychometricModel model;
   model.guess.value = 0.5;
@@ -379,7 +379,7 @@ TEST(PsychometricPosterior, EqualsADenseGrid) {
   EXPECT_NEAR(std::log(posterior.mean.slope), mean_log_slope / sum, 5e-3);
 }
 
-TEST(PsychometricPosterior, OfOneRateAtBothEndsEqualsADenseGrid) {
+TEST(PsychometricPosterior, OneRateAtBothEndsEqualsDenseGrid) {
   const std::vector<LevelCount> counts{
       {1, 20, 2}, {2, 20, 3}, {3, 20, 9}, {4, 20, 17}, {5, 20, 18}};
   PsychometricModel model;

@@ -96,7 +96,7 @@ TEST(SignalDetection, IntervalsCoverTheTruthIn200SimulatedStudies) {
   }
 }
 
-TEST(Type2Area, CountsPairsOfACorrectAndAWrongAnswer) {
+TEST(Type2Area, CountsPairsOfCorrectAndWrongAnswers) {
   const Type2Roc roc = type2_roc({{true, 4}, {true, 2}, {true, 2}, {false, 2}, {false, 1}});
   // Pairs: 4 above both; each 2 ties with one and is above the other: (2 + 1.5 + 1.5) / 6.
   EXPECT_NEAR(*roc.area, 5.0 / 6, 1e-15);
@@ -212,7 +212,7 @@ TransferMeans simulate_transfer(std::size_t trials, int studies, std::uint64_t s
 
 // The same simulation in R has biases of 0.098 and 0.025 bit with 80 trials (plain, corrected),
 // 0.0204 and 0.0042 with 400.
-TEST(Information, CorrectionTakesMostOfTheBiasOfSmallSamplesAway) {
+TEST(Information, CorrectionRemovesMostBiasOfSmallSamples) {
   const double truth = 2 + 0.625 * std::log2(0.625) + 0.375 * std::log2(0.125);
   for (const std::uint64_t seed : {1U, 2U}) {
     const TransferMeans few = simulate_transfer(80, 2000, seed);

@@ -128,7 +128,7 @@ TEST(RatedStimuli, HaveRenderersComparedOverAllOfABlock) {
   EXPECT_NEAR(*silk.t_test.p_holm, 2 * *silk.t_test.p, 1e-12);
 }
 
-TEST(RatedStimuli, OfOtherBlocksHaveOtherQuestions) {
+TEST(RatedStimuli, HaveOtherQuestionsInOtherBlocks) {
   StudyTable table = rated({{1, 3}, {2, 4}, {1, 5}}, {});
   for (StudyTrial& trial : table.trials)
     trial.block_name = trial.shape == "silk" ? "rough" : "warm";

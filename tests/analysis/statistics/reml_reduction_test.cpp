@@ -64,12 +64,12 @@ DenseTrials draw_trials(std::size_t renderers, std::size_t shapes, std::size_t p
 
 // A tall product is summed in blocks that Eigen fits to this machine's caches, unless it is kept
 // from asking.
-TEST(Matrices, AreSummedInTheSameOrderOnEveryMachine) {
+TEST(Matrices, AreSummedInOneOrderOnEveryMachine) {
   EXPECT_EQ(Eigen::l1CacheSize(), 32 * 1024);
   EXPECT_EQ(Eigen::internal::packet_traits<double>::size, 1);
 }
 
-TEST(ReducedModel, HasTheDegreesOfFreedomAndResidualsOfTheDenseModel) {
+TEST(ReducedModel, KeepsDenseModelsDegreesOfFreedomAndResiduals) {
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
     const std::size_t renderers = 2 + seed % 3, shapes = 1 + seed % 5, participants = 2 + seed % 7;
     const DenseTrials trials = draw_trials(renderers, shapes, participants, 1 + seed % 4, seed);

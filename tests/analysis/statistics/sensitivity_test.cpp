@@ -103,7 +103,7 @@ TEST(RankCorrelations, PartialOnesAreThoseOfTheResiduals) {
 }
 
 // In 95 % of samples Fisher's interval holds the correlation that they were drawn from: none, here.
-TEST(RankCorrelations, IntervalsHoldTheTruthAsOftenAsTheySay) {
+TEST(RankCorrelations, IntervalsHoldTheTruthAtTheirRate) {
   constexpr std::uint64_t kSeed = 11;
   Random random(kSeed);
   int spearman = 0, partial = 0;
@@ -155,7 +155,7 @@ TEST(RankCorrelations, EachParameterHeldConstantTakesOnePointAway) {
 }
 
 // A strong correlation, few points.
-TEST(RankCorrelations, IntervalsOfStrongOnesHoldTheTruthAsOftenAsTheySay) {
+TEST(RankCorrelations, IntervalsOfStrongOnesCoverAtTheirRate) {
   constexpr std::uint64_t kSeed = 12;
   Random random(kSeed);
   const auto sample = [&](std::size_t n) {
@@ -209,7 +209,7 @@ constexpr double kOfFirst = 100.0 / 12, kOfChance = 1 + 4 + 16.0 / 3;
 constexpr double kFirstShare = kOfFirst / (kOfFirst + kOfChance);
 
 // The variance of x1's part is 100/12, that of chance the mean of (1 + 4 x1)^2.
-TEST(SobolIndices, ChanceWithinThePointsIsInNoTotalIndex) {
+TEST(SobolIndices, ChanceWithinPointsIsInNoTotalIndex) {
   constexpr std::uint64_t kSeed = 8;
   Random random(kSeed);
   const NoisySweep sweep = noisy_sweep(4000, random);
@@ -228,7 +228,7 @@ TEST(SobolIndices, ChanceWithinThePointsIsInNoTotalIndex) {
   EXPECT_NEAR(*without.of[1].first, 0, 0.05);
 }
 
-TEST(SobolIndices, IntervalsOfInertParametersHoldZeroAsOftenAsTheySay) {
+TEST(SobolIndices, InertParametersIntervalsHoldZeroAtTheirRate) {
   constexpr std::uint64_t kSeed = 9;
   Random random(kSeed);
   int inert = 0, first = 0;
@@ -245,7 +245,7 @@ TEST(SobolIndices, IntervalsOfInertParametersHoldZeroAsOftenAsTheySay) {
 }
 
 // Some of the studies have one participant with times: no standard error.
-TEST(SobolIndices, StandardErrorsThatAreMissingAreTakenFromTheOthers) {
+TEST(SobolIndices, MissingStandardErrorsComeFromTheOthers) {
   constexpr std::uint64_t kSeed = 10;
   Random random(kSeed);
   NoisySweep sweep = noisy_sweep(2000, random);

@@ -19,7 +19,7 @@ Outcome nothing(const std::vector<double>&) { return {}; }
 
 // The samples of a base point share coordinates: with 29 parameters 31 of them say little more than
 // two. The truth is one half, by symmetry.
-TEST(PatternShare, IntervalOfSaltellisSamplesHoldsTheTruthAsOftenAsItSays) {
+TEST(PatternShare, SaltelliIntervalHoldsTheTruthAtItsRate) {
   constexpr std::uint64_t kSeed = 4;
   Random random(kSeed);
   constexpr int kSweeps = 400;
@@ -35,7 +35,7 @@ TEST(PatternShare, IntervalOfSaltellisSamplesHoldsTheTruthAsOftenAsItSays) {
   }
 }
 
-TEST(PatternShare, OfSaltellisSamplesAAndBCount) {
+TEST(PatternShare, CountsSaltellisSamplesAAndB) {
   constexpr std::uint64_t kSeed = 5;
   Random random(kSeed);
   SweepTable table =
@@ -74,7 +74,7 @@ TEST(PatternShare, AGridHasNoInterval) {
   }
 }
 
-TEST(SweepAnalysis, LooksForThePapersPatternWhereItsShapesAndRenderersAre) {
+TEST(SweepAnalysis, SeeksPapersPatternGivenItsShapesAndRenderers) {
   // Two settings: one as in the paper, one where the sphere gains as much.
   SweepTable table = table_of("lhs", {{0.2}, {0.8}}, [](const auto&) { return Outcome{22, 1}; });
   EXPECT_FALSE(analyze_sweep(table, "", "1").pattern) << "the cone alone";
@@ -92,7 +92,7 @@ TEST(SweepAnalysis, LooksForThePapersPatternWhereItsShapesAndRenderersAre) {
   EXPECT_FALSE(analyze_sweep(table, "", "1").pattern) << "other renderers";
 }
 
-TEST(SweepAnalysis, SaysOfEachTotalIndexWhetherChanceIsAPartOfIt) {
+TEST(SweepAnalysis, SaysWhichTotalIndicesContainChance) {
   constexpr std::uint64_t kSeed = 6;
   Random random(kSeed);
   const auto points = saltelli_points(2, 200, [&] { return random.unit(); });

@@ -47,7 +47,7 @@ double power_of_six(double mean) {
   return static_cast<double>(found) / kStudies;
 }
 
-TEST(ThresholdPlan, OfMeasuredJndsIsThatOfTheirTrueRatios) {
+TEST(ThresholdPlan, MeasuredJndsGiveThePlanOfTrueRatios) {
   for (const double ratio : {0.8, 1.0}) {
     ThresholdStudy study;
     study.effect = std::log(ratio);

@@ -28,26 +28,26 @@ std::vector<std::size_t> reversals(const std::vector<double>& levels, const std:
 
 using Answers = std::vector<std::size_t>;
 
-TEST(Tracks, OfOneDownOneUpReverseWhereTheAnswerChanges) {
+TEST(Tracks, OneDownOneUpReversesWhereAnswersChange) {
   EXPECT_EQ(reversals({5, 4, 3, 4, 3, 4, 5}, "++-+--+"), (Answers{2, 3, 4, 6}));
 }
 
-TEST(Tracks, WhereSuccessesRaiseTheLevelReverseInTheSameWay) {
+TEST(Tracks, ReverseAlsoWhereSuccessesRaiseTheLevel) {
   EXPECT_EQ(reversals({3, 4, 5, 4, 5, 4, 3}, "++-+--+"), (Answers{2, 3, 4, 6}));
 }
 
-TEST(Tracks, OfTwoDownOneUpReverseWhereTheWayChanges) {
+TEST(Tracks, TwoDownOneUpReversesWhereDirectionChanges) {
   EXPECT_EQ(reversals({5, 5, 4, 4, 3, 4, 4, 3}, "++++-++-"), (Answers{4, 6, 7}));
 }
 
-TEST(Tracks, ThatDoNotFollowTheAnswersDoNotReverse) {
+TEST(Tracks, NeverReverseUnlessTheyFollowTheAnswers) {
   EXPECT_EQ(reversals({5, 4, 5, 4, 3, 4}, "+++--+"), Answers());
   EXPECT_EQ(reversals({5, 4, 3, 2}, "+--+"), Answers()) << "down after a failure as well";
 }
 
-TEST(Tracks, OfConstantLevelsDoNotReverse) { EXPECT_EQ(reversals({5, 5, 5}, "+-+"), Answers()); }
+TEST(Tracks, ConstantLevelsDoNotReverse) { EXPECT_EQ(reversals({5, 5, 5}, "+-+"), Answers()); }
 
-TEST(Tracks, LeaveOutWhatWasNotAnsweredAndCatchTrials) {
+TEST(Tracks, LeaveOutUnansweredAndCatchTrials) {
   StudyTable table;
   for (const double level : {5.0, 9.0, 4.0, 9.0, 3.0}) {
     StudyTrial trial;
