@@ -9,7 +9,7 @@
 namespace palpate::data {
 namespace {
 
-TEST(ColumnTable, KeepsTheTypeOfEachColumnAndMarksWhatIsMissing) {
+TEST(ColumnTable, KeepsTypesOfColumnsAndMarksMissingValues) {
   ColumnTable table({"name", "count", "yes", "time"});
   table << "a" << 3 << true << std::optional<double>(0.5);
   table.end_row();

@@ -53,7 +53,7 @@ TEST(Record, NumbersSettingsAndTiesHaveNoRightAnswer) {
   EXPECT_TRUE(has_right_answer(alike)) << "no level was set for either";
 }
 
-TEST(Record, EndsOfRunsAreReadAsTheyAreWritten) {
+TEST(Record, EndsOfRunsAreReadAsWritten) {
   for (const RunEnd end : {RunEnd::running, RunEnd::done, RunEnd::paused, RunEnd::withdrawn,
                            RunEnd::aborted, RunEnd::interrupted})
     EXPECT_EQ(parse_run_end(to_string(end)), end);

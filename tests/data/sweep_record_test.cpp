@@ -32,7 +32,7 @@ Names with_errors(const Names& measures, const std::string& place) {
   return out;
 }
 
-TEST(SweepColumns, OfATaskAreMeasureBlockStimulusRenderer) {
+TEST(SweepColumns, TaskColumnsAreMeasureBlockStimulusRenderer) {
   const struct {
     const char* task;
     Names measures;
@@ -58,7 +58,7 @@ TEST(SweepColumns, OfATaskAreMeasureBlockStimulusRenderer) {
   }
 }
 
-TEST(SweepColumns, OfIdentificationHaveItsInformationOverAllStimuli) {
+TEST(SweepColumns, IdentificationHasInformationOverAllStimuli) {
   const SweepPlan plan = plan_of(
       R"({"name": "who", "task": "identify", "stimuli": ["ball", "hat"], "renderers": ["ray"]})");
   EXPECT_EQ(figure_columns(plan),
@@ -73,7 +73,7 @@ TEST(SweepColumns, OfIdentificationHaveItsInformationOverAllStimuli) {
   EXPECT_EQ(cells[2].stimulus, "");
 }
 
-TEST(SweepColumns, OfVersion1AreTimesByShapeAndRenderer) {
+TEST(SweepColumns, Version1HasTimesByShapeAndRenderer) {
   SweepPlan plan = plan_of("");
   plan.protocol = R"({"version": 1})";
   EXPECT_TRUE(task_columns(plan).empty());

@@ -11,7 +11,7 @@ namespace {
 
 using namespace std::string_literals;
 
-TEST(Printable, ShowsPlainTextOfAnyLanguageAsItStands) {
+TEST(Printable, KeepsPlainTextOfAnyLanguage) {
   for (const std::string text : {"", "cube", "Würfel", "形", "🙂 ok", "שלום", "− … µ"})
     EXPECT_EQ(printable(text), text);
 }

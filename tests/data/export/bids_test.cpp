@@ -95,7 +95,7 @@ TEST(Bids, ItsReadmeShowsTextsLiterally) {
   }
 }
 
-TEST(Bids, ListsTheMotionOfASessionOfTwoProtocolsInOneTable) {
+TEST(Bids, ListsMotionOfTwoProtocolsInOneTable) {
   const TemporaryFolder folder;
   Store store = Store::open(folder / "s.db", Store::Mode::write_or_create);
   for (const char protocol : {'a', 'b'}) {

@@ -50,7 +50,7 @@ TEST_F(ExportCsv, TheCodebookDescribesEveryColumnAndBit) {
   EXPECT_EQ(by_name(rows(), 1).at("shape"), "'-cube");
 }
 
-TEST(SampleColumns, HaveOneUnitForTheCoordinatesOfAQuantity) {
+TEST(SampleColumns, HaveOneUnitForAQuantitysCoordinates) {
   std::map<std::string, std::string> unit_of;
   for (const Column& column : sample_columns()) {
     const std::string name = column.name;

@@ -16,7 +16,7 @@ class SweepCsv : public ::testing::Test {
   const std::string out_ = folder_ / "a.csv";
 };
 
-TEST_F(SweepCsv, HasARowPerPointWithColumnsInOrder) {
+TEST_F(SweepCsv, HasOrderedColumnsAndARowPerPoint) {
   SweepRow row = a_sweep_row(4);
   row.values = {0.1, std::string("=1+1")};
   row.figures.assign(row.figures.size(), std::nullopt);

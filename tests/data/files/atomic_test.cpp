@@ -88,7 +88,7 @@ TEST_F(AtomicFiles, EveryDescriptorIsClosedWhateverHappens) {
   EXPECT_EQ(names_in(target_), (std::set<std::string>{"deep"}));
 }
 
-TEST_F(AtomicFiles, ClearsOnlyLeftoversOfKilledProcessesForTheSameTarget) {
+TEST_F(AtomicFiles, ClearsOnlyKilledProcessesLeftoversForTheTarget) {
   // A folder in use is locked; the folder of a killed process is not.
   std::string writing;
   {

@@ -30,7 +30,7 @@ class StaleTemporaries : public ::testing::Test {
   const TemporaryFolder folder_;
 };
 
-TEST_F(StaleTemporaries, AreClearedWhereTheTargetIsNamedWithoutAFolder) {
+TEST_F(StaleTemporaries, AreClearedForATargetWithoutAFolder) {
   write(".t.palpate-abcdef");
   write(".u.palpate-abcdef");
   const fs::path before = fs::current_path();
@@ -77,7 +77,7 @@ TEST_F(StaleTemporaries, AreFilesOfOneNameAndFoldersOnly) {
   EXPECT_EQ(left(), (std::set<std::string>{"mine", ".t.palpate-aaaaaa", ".t.palpate-bbbbbb"}));
 }
 
-TEST_F(StaleTemporaries, OfLongNamesFitAName) {
+TEST_F(StaleTemporaries, FitTheLimitForLongNames) {
   const std::string stem = fs::path(temporary_prefix(std::string(255, 'n'))).filename().string();
   EXPECT_LE(stem.size() + random_letters().size(), 255U);
   EXPECT_EQ(temporary_prefix("a/b/t"), "a/b/.t.palpate-");

@@ -57,7 +57,7 @@ TEST_F(TrustedLinks, NeedNoFileAtTheirEnd) {
   EXPECT_EQ(resolve_trusted_links(folder_ / "dangling").path, real_path(folder_ / "a") + "/later");
 }
 
-TEST_F(TrustedLinks, ChainsOfFortyAreFollowedAndCirclesAreNot) {
+TEST_F(TrustedLinks, FollowsChainsOfFortyButNoCircles) {
   fs::create_symlink("a/b/file", folder_ / "link1");
   for (int k = 2; k <= 41; ++k)
     fs::create_symlink("link" + std::to_string(k - 1), folder_ / ("link" + std::to_string(k)));
@@ -69,7 +69,7 @@ TEST_F(TrustedLinks, ChainsOfFortyAreFollowedAndCirclesAreNot) {
   EXPECT_NE(resolve_trusted_links("").fault, "");
 }
 
-TEST_F(TrustedLinks, OfOtherUsersAreNotFollowed) {
+TEST_F(TrustedLinks, OtherUsersLinksAreNotFollowed) {
   if (::geteuid() != 0) GTEST_SKIP() << "only root can lay a link of another user";
   ASSERT_EQ(::lchown((folder_ / "relative").c_str(), 12345, 12345), 0);
   const ResolvedPath found = resolve_trusted_links(folder_ / "here/relative/file");

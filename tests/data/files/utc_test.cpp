@@ -13,7 +13,7 @@ TEST(FormatUtc, IsIso8601CutToMicroseconds) {
   EXPECT_EQ(format_utc(951'782'400'000'000'000), "2000-02-29T00:00:00.000000Z");
 }
 
-TEST(FormatUtc, HoldsBeforeTheEpochAndAtTheEndsOfTheRange) {
+TEST(FormatUtc, HoldsBeforeTheEpochAndAtRangeEnds) {
   EXPECT_EQ(format_utc(-1), "1969-12-31T23:59:59.999999Z");
   EXPECT_EQ(format_utc(std::numeric_limits<std::int64_t>::max()), "2262-04-11T23:47:16.854775Z");
   EXPECT_EQ(format_utc(std::numeric_limits<std::int64_t>::min()), "1677-09-21T00:12:43.145224Z");

@@ -71,7 +71,7 @@ TEST_F(Merging, OverlappingSessionsOfOneParticipantAreAConflict) {
   EXPECT_TRUE(contains(refusal({a_, b_}), "sessions 1 and 2 were at the same time"));
 }
 
-TEST_F(Merging, ASessionLastsUntilItsLastRunHasEnded) {
+TEST_F(Merging, SessionsLastUntilTheirLastRunEnds) {
   {
     Store a = open_station(a_), b = open_station(b_);
     record_session(a, "P1", 1, 1);

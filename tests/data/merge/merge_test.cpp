@@ -45,7 +45,7 @@ TEST_F(Merging, HoldsWhatTheStationsHold) {
   EXPECT_EQ(open_station(out_).enrol(a_protocol(), "P5").number, 5) << "and can be continued";
 }
 
-TEST_F(Merging, AgainOrInAnotherOrderIsTheSameToTheByte) {
+TEST_F(Merging, RepeatedOrReorderedGivesTheSameBytes) {
   {
     Store a = open_station(a_), b = open_station(b_);
     record_session(a, "P1", 1);
@@ -76,7 +76,7 @@ TEST_F(Merging, AnotherSessionOfTheSameParticipantIsAdded) {
   EXPECT_EQ(merge(out_, {a_, b_}).counts.sessions, 2);
 }
 
-TEST_F(Merging, NumbersGivenTwiceAreRenumberedOnRequestAndTheTrialsKeepTheirOrder) {
+TEST_F(Merging, RenumbersDuplicatesOnRequestKeepingOrderOfTrials) {
   const std::string c = folder_ / "c.db", again = folder_ / "again.db";
   {
     Store a = open_station(a_), b = open_station(b_), third = open_station(c);

@@ -29,7 +29,7 @@ class SweepMerges : public ::testing::Test {
   const std::string out_ = folder_ / "out.sweep";
 };
 
-TEST_F(SweepMerges, TheUnionHasTheBytesOfOneProcessWhateverTheOrder) {
+TEST_F(SweepMerges, AnyOrderGivesTheBytesOfOneProcess) {
   make_sweep(folder_ / "one.sweep", {1, 2, 3, 5, 8, 9}, true);
   const std::vector<std::string> parts{made("a.sweep", {9, 2}), made("b.sweep", {5, 1, 2}),
                                        made("c.sweep", {3, 8})};
@@ -99,7 +99,7 @@ TEST(SweepPlans, EveryDifferenceIsNamedAndNoOther) {
   }
 }
 
-TEST_F(SweepMerges, FilesThatAreWrittenToMissOrExistAreRefused) {
+TEST_F(SweepMerges, RefusesBusyMissingOrExistingFiles) {
   const std::string a = made("a.sweep", {1});
   expect_refused({}, "no file to merge");
   expect_refused({a, folder_ / "none.sweep"}, "no such file");

@@ -291,7 +291,7 @@ TEST_F(DamagedDatabase, ValuesThatPalpateNeverWrites) {
   }
 }
 
-TEST_F(DamagedDatabase, TextsComeOutOfTheCsvAsTheyWentInButForTheGuard) {
+TEST_F(DamagedDatabase, CsvKeepsTextsExceptForTheGuard) {
   {
     SQLite::Database db(path_, SQLite::OPEN_READWRITE);
     db.exec("UPDATE attempts SET shape = '=1+1', response = ',\"\r\n\t' WHERE id = 1");
@@ -306,7 +306,7 @@ TEST_F(DamagedDatabase, TextsComeOutOfTheCsvAsTheyWentInButForTheGuard) {
   EXPECT_FALSE(fs::exists(folder_ / "out/bids2"));
 }
 
-TEST_F(DamagedDatabase, WhatTheSchemaForbidsIsFoundByAWriterAtOnceByAReaderWhenItReadsIt) {
+TEST_F(DamagedDatabase, WritersFindForbiddenRowsAtOnceReadersLater) {
   for (const char* const forbidden :
        {"trial = 0", "attempt = 0", "block = 0", "practice = 2", "response = NULL", "correct = 2",
         "timed_out = 2", "timed_out = 1", "response_time = NULL", "onset_ns = NULL", "ticks = -1",
@@ -323,7 +323,7 @@ TEST_F(DamagedDatabase, WhatTheSchemaForbidsIsFoundByAWriterAtOnceByAReaderWhenI
   }
 }
 
-TEST_F(DamagedDatabase, ARowHiddenByADamagedIndexIsDetected) {
+TEST_F(DamagedDatabase, DetectsRowsHiddenByADamagedIndex) {
   // An index without one row hides the row from every export that uses the index.
   SQLite::Database db(path_, SQLite::OPEN_READWRITE);
   db.exec(

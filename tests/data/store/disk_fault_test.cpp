@@ -72,7 +72,7 @@ bool on_a_small_disk(const std::string& folder, const std::function<void()>& bod
   return true;
 }
 
-TEST(StoreFault, AFullDiskSavesNothingOfTheTrialAndTheSessionResumesAfterwards) {
+TEST(StoreFault, FullDiskSavesNoTrialAndSessionResumes) {
   const TemporaryFolder folder;
   const bool possible = on_a_small_disk(folder.path(), [&] {
     const std::string path = folder / "study.db";
@@ -140,7 +140,7 @@ void expect_whole_or_not_at_all(const TemporaryFolder& folder, const std::string
   EXPECT_EQ(done, 3);
 }
 
-TEST(StoreFault, AFullDiskLeavesNoBrokenFileUnderItsFinalName) {
+TEST(StoreFault, FullDiskLeavesNoBrokenFinalFile) {
   const TemporaryFolder folder, elsewhere;
   const std::string station = elsewhere / "station.db";
   {
@@ -164,7 +164,7 @@ TEST(StoreFault, AFullDiskLeavesNoBrokenFileUnderItsFinalName) {
   if (!possible) GTEST_SKIP() << "no small disk may be mounted here";
 }
 
-TEST(StoreFault, AReadOnlyDiskCanBeReadAndSaysWhyItCannotBeWritten) {
+TEST(StoreFault, ReadOnlyDiskReadsAndExplainsRefusedWrites) {
   const TemporaryFolder folder;
   const bool possible = on_a_small_disk(folder.path(), [&] {
     const std::string path = folder / "study.db";
@@ -185,7 +185,7 @@ TEST(StoreFault, AReadOnlyDiskCanBeReadAndSaysWhyItCannotBeWritten) {
   if (!possible) GTEST_SKIP() << "no small disk may be mounted here";
 }
 
-TEST(StoreFault, AFileThatMayNotGrowSavesNothingOfTheTrial) {
+TEST(StoreFault, FileThatMayNotGrowSavesNoTrial) {
   const TemporaryFolder folder;
   Store store = open_to_write(folder / "study.db");
   const Participant person = store.enrol(a_protocol(), "A");
@@ -250,7 +250,7 @@ class Unprivileged {
   bool was_root_;
 };
 
-TEST(StoreFault, AFileThatMayNotBeWrittenIsRefusedBeforeTheSession) {
+TEST(StoreFault, RefusesUnwritableFilesBeforeTheSession) {
   const TemporaryFolder folder;
   const Unprivileged unprivileged(folder.path());
   open_to_write(folder / "study.db");

@@ -86,7 +86,7 @@ void expect_nothing_lost(const std::string& path, const Said& said) {
   EXPECT_GE(completed, said.acknowledged) << "an acknowledged trial is lost";
 }
 
-TEST(Durability, ASessionKilledAtAnyMomentLosesNothingAndResumes) {
+TEST(Durability, SessionKilledAtAnyMomentResumesWithoutLoss) {
   constexpr int kTrials = 30;
   constexpr int kKills = 120;
   constexpr std::uint32_t kSeed = 2000;
@@ -143,7 +143,7 @@ TEST(Durability, ASessionKilledAtAnyMomentLosesNothingAndResumes) {
   RecordProperty("kills", kills);
 }
 
-TEST(Durability, ASimulationKilledAtAnyMomentExportsTheSameBytes) {
+TEST(Durability, SimulationKilledAnytimeExportsTheSameBytes) {
   constexpr int kTrials = 100;
   const auto export_of = [](const std::string& path) {
     Store store = Store::open(path, Store::Mode::read_only);

@@ -11,7 +11,7 @@ namespace {
 
 using namespace palpate::data::testing;
 
-TEST_F(Forgetting, ListsTheExportsThatHoldTheParticipantAlsoAfterwards) {
+TEST_F(Forgetting, ListsTheParticipantsExportsAlsoAfterwards) {
   Store store = open();
   const auto people = store.participants(a_protocol().sha256);
   ASSERT_EQ(people[0].code, kGone);
@@ -34,7 +34,7 @@ TEST_F(Forgetting, ListsTheExportsThatHoldTheParticipantAlsoAfterwards) {
       << "it was made anew without the participant";
 }
 
-TEST_F(Forgetting, ExportsAreRecordedWithoutTheFoldersOfTheComputer) {
+TEST_F(Forgetting, RecordsExportsWithoutTheComputersFolders) {
   Store store = open();
   const auto people = store.participants(a_protocol().sha256);
   const TemporaryFolder other, third;
@@ -57,7 +57,7 @@ TEST_F(Forgetting, ExportsAreRecordedWithoutTheFoldersOfTheComputer) {
   EXPECT_EQ(exports[3].path, "last.csv");
 }
 
-TEST_F(Forgetting, ExportsOfACopyThatHasNoWriteAheadLogAreRecorded) {
+TEST_F(Forgetting, RecordsExportsOfCopiesWithoutWriteAheadLog) {
   const std::string copy = folder_ / "copy.db";
   open();
   SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("VACUUM INTO '" + copy + "'");

@@ -20,7 +20,7 @@ namespace {
 using namespace palpate::data::testing;
 namespace fs = std::filesystem;
 
-TEST_F(Forgetting, LeavesNoByteBehindAndTheOthersAsTheyWere) {
+TEST_F(Forgetting, LeavesNoByteBehindAndOthersUntouched) {
   ASSERT_EQ(holders_of(kGone), "study.db ");
   ASSERT_EQ(holders_of(bytes_of(kPose)), "study.db ");
   {
@@ -91,7 +91,7 @@ TEST_F(Forgetting, DeletesTheBackupsThatHoldTheParticipant) {
   expect_gone();
 }
 
-TEST_F(Forgetting, TemporaryFilesOfKilledExportsAreRemovedAndOtherFilesStay) {
+TEST_F(Forgetting, RemovesOnlyTemporaryFilesOfKilledExports) {
   const std::string temporary = folder_ / ".trials.csv.palpate-Ab3-_9",
                     dataset = folder_ / ".bids.palpate-XyZ012";
   write_file(temporary, "P01,1\n");
@@ -127,7 +127,7 @@ TEST_F(Forgetting, CountsNotesOnOthersThatSayTheCode) {
   EXPECT_EQ(store.participant_summary("P7").mentions, 2);
 }
 
-TEST_F(Forgetting, AReaderKeepsTheWalAndTheSameCallFinishesLater) {
+TEST_F(Forgetting, FinishesLaterIfAReaderKeepsTheWal) {
   {
     Store store = open();
     Store reader = Store::open(path_, Store::Mode::read_only);
@@ -138,7 +138,7 @@ TEST_F(Forgetting, AReaderKeepsTheWalAndTheSameCallFinishesLater) {
   expect_gone();
 }
 
-TEST_F(Forgetting, KilledAtAnyMomentItIsAllThereOrTheSameCallFinishes) {
+TEST_F(Forgetting, KilledAtAnyMomentTheSameCallFinishes) {
   const std::string original = contents_of(path_);
   constexpr std::uint32_t kSeed = 7;
   std::mt19937 random(kSeed);

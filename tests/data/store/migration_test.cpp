@@ -79,7 +79,7 @@ TEST_F(Migrating, AnEarlierCopyIsKept) {
   EXPECT_EQ(contents_of(copy_), "an earlier copy");
 }
 
-TEST_F(Migrating, AStepThatFailsLeavesTheDatabaseAsItWas) {
+TEST_F(Migrating, FailedStepsLeaveTheDatabaseUnchanged) {
   constexpr Migration kBroken[] = {{kNow, "DELETE FROM attempts"},
                                    {kNow + 1, "DELETE FROM nowhere"}};
   {
@@ -89,7 +89,7 @@ TEST_F(Migrating, AStepThatFailsLeavesTheDatabaseAsItWas) {
   expect_untouched();
 }
 
-TEST_F(Migrating, AMissingStepLeavesTheDatabaseAsItWas) {
+TEST_F(Migrating, MissingStepsLeaveTheDatabaseUnchanged) {
   {
     SQLite::Database db(path_, SQLite::OPEN_READWRITE);
     EXPECT_TRUE(contains(error_of([&] { migrate(db, path_, kNow, kNow + 9, kSteps); }),

@@ -57,7 +57,7 @@ class StoreOpen : public ::testing::Test {
   const std::string path_ = folder_ / "study.db";
 };
 
-TEST_F(StoreOpen, LeavesOneFileThatOnlyItsOwnerMayRead) {
+TEST_F(StoreOpen, LeavesOneFileReadableByItsOwnerOnly) {
   const auto mode_of = [](const std::string& path) {
     struct stat found {};
     return ::stat(path.c_str(), &found) == 0 ? found.st_mode & 0777 : 0;
@@ -139,7 +139,7 @@ TEST_F(StoreOpen, ATruncatedFileIsRefused) {
   }
 }
 
-TEST_F(StoreOpen, ADamagedPageIsFoundWhenTheFileIsOpened) {
+TEST_F(StoreOpen, FindsDamagedPagesOnOpening) {
   make_study();
   const std::string whole = contents_of(path_);
   const std::size_t pages = whole.size() / 4096;
@@ -179,7 +179,7 @@ TEST_F(StoreOpen, OddNamesAndLinksAreOrdinaryFiles) {
       << "one file under two names";
 }
 
-TEST_F(StoreOpen, TheSecondWriterIsRefusedAndToldWhoHoldsIt) {
+TEST_F(StoreOpen, RefusesASecondWriterNamingTheHolder) {
   ChildProcess holder({"hold", path_});
   ASSERT_EQ(holder.read_line(), "held");
   const std::string error = error_of([&] { write(path_); });
@@ -257,7 +257,7 @@ TEST_F(StoreOpen, LinksMadeMeanwhileLoseNoTrial) {
   EXPECT_TRUE(contains(error_of([&] { write(path_); }), "has 2 names"));
 }
 
-TEST_F(StoreOpen, AReaderSeesWhatWasCommittedWhenItOpened) {
+TEST_F(StoreOpen, ReadersSeeWhatWasCommittedAtOpening) {
   Store writer = write(path_);
   const palpate::data::Run run = writer.begin_run(writer.enrol(a_protocol(), "A"), a_run());
   writer.begin_attempt(run, a_record(1), 1);
@@ -281,7 +281,7 @@ TEST_F(StoreOpen, AReaderDoesNotWrite) {
   EXPECT_THROW(reader.add_note({}, 1, "x"), StoreRefused);
 }
 
-TEST_F(StoreOpen, AWalWithoutItsDatabaseIsNotRecoveredIntoANewOne) {
+TEST_F(StoreOpen, NewDatabaseDoesNotRecoverAStrayWal) {
   make_study();
   {
     Store store = write(path_);
@@ -307,7 +307,7 @@ TEST_F(StoreOpen, AnInterruptedCreationIsRepeated) {
   }
 }
 
-TEST_F(StoreOpen, FilesWhoseNamesOnlyResembleItsTemporaryOrLockFilesStay) {
+TEST_F(StoreOpen, KeepsFilesThatOnlyResembleItsOwn) {
   const std::vector<std::string> others = {path_ + ".lock", path_ + ".palpate-new",
                                            path_ + ".palpate-new-wal"};
   for (const std::string& other : others) write_file(other, "mine");
@@ -324,7 +324,7 @@ TEST_F(StoreOpen, FilesWhoseNamesOnlyResembleItsTemporaryOrLockFilesStay) {
   EXPECT_EQ(contents_of(path_ + ".lock"), "mine");
 }
 
-TEST_F(StoreOpen, OfManyConcurrentWritersOneHoldsTheLock) {
+TEST_F(StoreOpen, OneOfManyWritersHoldsTheLock) {
   for (int round = 0; round < 5; ++round) {
     // First without a lock file, then with the lock file of a killed process.
     std::vector<std::unique_ptr<ChildProcess>> all;
@@ -365,7 +365,7 @@ TEST_F(StoreOpen, ATruncatedWalIndexLosesNothing) {
   EXPECT_EQ(files(), 1);
 }
 
-TEST_F(StoreOpen, NoDatabaseIsNamedLikeASqliteFileOfAnother) {
+TEST_F(StoreOpen, RefusesNamesOfAnotherDatabasesSqliteFiles) {
   make_study(1);
   for (const char* end : {"-wal", "-shm", "-journal", ".palpate-lock"}) {
     EXPECT_TRUE(contains(error_of([&] { write(path_ + end); }), path_ + end));

@@ -12,7 +12,7 @@ using namespace palpate::data::testing;
 
 using Enrolment = StoreOnDisk;
 
-TEST_F(Enrolment, ParticipantsGetTheSmallestUnusedNumberOrTheWantedOne) {
+TEST_F(Enrolment, GivesTheSmallestFreeNumberOrTheWanted) {
   Store store = open();
   EXPECT_EQ(store.enrol(a_protocol(), "A").number, 1);
   EXPECT_EQ(store.enrol(a_protocol(), "B", 3).number, 3);
@@ -25,7 +25,7 @@ TEST_F(Enrolment, ParticipantsGetTheSmallestUnusedNumberOrTheWantedOne) {
   EXPECT_EQ(store.counts().participants, 5);
 }
 
-TEST_F(Enrolment, LookUpWritesNothingAndTellsTheNextNumber) {
+TEST_F(Enrolment, LookUpTellsTheNextNumberWritingNothing) {
   Store store = open();
   EXPECT_EQ(store.look_up(a_protocol(), "A").number, 1);
   EXPECT_EQ(store.look_up(a_protocol(), "A", 4).number, 4);

@@ -36,7 +36,7 @@ TEST_F(ProtocolFiles, AreKeptByteForByte) {
   EXPECT_TRUE(store.files(a_protocol('b').sha256).empty());
 }
 
-TEST_F(ProtocolFiles, AChangedOneIsRefusedAndNothingIsStored) {
+TEST_F(ProtocolFiles, RefusesAChangedOneAndStoresNothing) {
   Store store = open();
   store.enrol(with_files("v 0 0 0"), "P1");
   const std::string message = error_of([&] { store.enrol(with_files("v 1.4 0 0"), "P2"); });
@@ -56,7 +56,7 @@ TEST_F(ProtocolFiles, AMissingFileIsAdded) {
   EXPECT_EQ(runs.at(1).info.files_sha256.size(), 64u);
 }
 
-TEST_F(ProtocolFiles, ChangedInTheDatabaseIsFoundByEveryReader) {
+TEST_F(ProtocolFiles, EveryReaderFindsAChangeInTheDatabase) {
   open().enrol(with_files("v 0 0 0"), "P1");
   const std::string original = contents_of(path_);
   for (const char* edit : {"UPDATE files SET bytes = x'00' WHERE id = 1",
@@ -71,7 +71,7 @@ TEST_F(ProtocolFiles, ChangedInTheDatabaseIsFoundByEveryReader) {
   }
 }
 
-TEST_F(ProtocolFiles, ATextThatNestsTooDeepIsRefusedByEveryReader) {
+TEST_F(ProtocolFiles, EveryReaderRefusesTextsNestedTooDeep) {
   ProtocolInfo deep = a_protocol();
   deep.text =
       R"({"version": 1, "deep": )" + std::string(200'000, '[') + std::string(200'000, ']') + "}";

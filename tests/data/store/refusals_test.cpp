@@ -43,7 +43,7 @@ struct Wrong {
   std::function<void(Record&)> change;
 };
 
-TEST(Refusals, OfAPlanNameTheField) {
+TEST(Refusals, NameTheFieldOfAPlan) {
   const auto message = [](const TrialRecord& plan) {
     return message_of([&](Validator& validator) { validate_plan(validator, plan, 1); });
   };
@@ -72,7 +72,7 @@ TEST(Refusals, OfAPlanNameTheField) {
             "it: not stored: block must be 1 or more, not 0; shape must not be empty");
 }
 
-TEST(Refusals, OfAnOutcomeNameTheField) {
+TEST(Refusals, NameTheFieldOfAnOutcome) {
   const auto message = [](const TrialRecord& record) {
     return message_of([&](Validator& validator) { validate_outcome(validator, record); });
   };
@@ -103,7 +103,7 @@ TEST(Refusals, OfAnOutcomeNameTheField) {
   }
 }
 
-TEST(Refusals, OfARunNameTheField) {
+TEST(Refusals, NameTheFieldOfARun) {
   const auto message = [](const RunInfo& run, bool simulated) {
     return message_of([&](Validator& validator) { validate(validator, run, simulated); });
   };
@@ -129,7 +129,7 @@ TEST(Refusals, OfARunNameTheField) {
   EXPECT_NE(message(simulated, false), "") << "a human has no observer settings";
 }
 
-TEST(Refusals, OfAnAnswerNameTheField) {
+TEST(Refusals, NameTheFieldOfAnAnswer) {
   PageAnswer good;
   good.page = "consent";
   good.item = "agree";
@@ -178,7 +178,7 @@ TEST_F(StoreRefusals, AnAttemptIsCutOffForAReason) {
   EXPECT_THROW(store.cut_off_attempt(run, "device fault"), StoreRefused) << "none is open";
 }
 
-TEST_F(StoreRefusals, ASimulatedTrialHasAPlanOfItsSession) {
+TEST_F(StoreRefusals, SimulatedTrialsNeedAPlanOfTheirSession) {
   Store store = open();
   const auto run = store.begin_run(store.enrol(a_protocol(), "S1", {}, true, 1), a_run());
   TrialRecord other_session = a_record(1), no_shape = a_record(1), no_number = a_record(1);

@@ -8,7 +8,7 @@ namespace {
 
 using namespace palpate::data::testing;
 
-TEST(RemainingCopies, CopiesTablesAndReportsBesideTheDatabaseAreNamed) {
+TEST(RemainingCopies, NamesCopiesTablesAndReportsBesideTheDatabase) {
   const TemporaryFolder folder;
   const std::string path = folder / "s.db";
   {
@@ -29,7 +29,7 @@ TEST(RemainingCopies, CopiesTablesAndReportsBesideTheDatabaseAreNamed) {
                                 folder / "s.db.bak", folder / "trials.csv"}));
 }
 
-TEST(RemainingCopies, FiguresInFoldersAndBackupsUnderAnyNameAreNamed) {
+TEST(RemainingCopies, FindsFiguresInFoldersAndRenamedBackups) {
   const TemporaryFolder folder;
   const std::string path = folder / "v2.db";
   Store store = Store::open(path, Store::Mode::write_or_create);
@@ -56,7 +56,7 @@ TEST(RemainingCopies, FiguresInFoldersAndBackupsUnderAnyNameAreNamed) {
                                       folder / "v2.db~"}));
 }
 
-TEST(RemainingCopies, OfTextsAreLookedForUpTo256MiB) {
+TEST(RemainingCopies, SearchesTextsUpTo256MiB) {
   const TemporaryFolder folder;
   const std::string path = folder / "s.db";
   Store store = Store::open(path, Store::Mode::write_or_create);

@@ -109,7 +109,7 @@ TEST(StoreRoundTrip, EveryFieldOfATrial) {
   EXPECT_EQ(progress.completed[1].onset_utc, trials[1].record.onset_utc);
 }
 
-TEST(StoreRoundTrip, OnsetOnTheCalendarFollowsFromTheRunsClock) {
+TEST(StoreRoundTrip, CalendarOnsetFollowsFromTheRunsClock) {
   const TemporaryFolder folder;
   Store store = Store::open(folder / "s.db", Store::Mode::write_or_create);
   const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), "P1"), a_run());
@@ -159,7 +159,7 @@ TEST(StoreRoundTrip, EveryFieldOfARunAndItsParticipant) {
   EXPECT_EQ(trial.protocol_sha256, a_protocol('b').sha256);
 }
 
-TEST(StoreRoundTrip, SamplesAreTiedToTheirTrialBitForBit) {
+TEST(StoreRoundTrip, SamplesKeepTheirTrialAndEveryBit) {
   const TemporaryFolder folder;
   Store store = Store::open(folder / "s.db", Store::Mode::write_or_create);
   const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), "P1"), a_run());

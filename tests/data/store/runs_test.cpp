@@ -12,7 +12,7 @@ using namespace palpate::data::testing;
 
 using StoreSession = StoreOnDisk;
 
-TEST_F(StoreSession, TheLatestRecordedTimeIsOfALiveSession) {
+TEST_F(StoreSession, LatestRecordedTimeIsOfALiveSession) {
   Store store = open();
   EXPECT_EQ(store.latest_recorded_time(), std::nullopt);
   RunInfo info = a_run();
@@ -49,7 +49,7 @@ TEST_F(StoreSession, ProgressStartsEmptyAndGrowsByTrial) {
   EXPECT_TRUE(store.progress(person, 2).completed.empty());
 }
 
-TEST_F(StoreSession, AnInterruptionIsRecordedAndTheTrialIsShownAgain) {
+TEST_F(StoreSession, RecordsInterruptionsAndShowsTheTrialAgain) {
   Participant person;
   {
     Store store = open();
@@ -103,7 +103,7 @@ TEST_F(StoreSession, AnInterruptionIsRecordedAndTheTrialIsShownAgain) {
   EXPECT_EQ(store.counts().interrupted_runs, 1);
 }
 
-TEST_F(StoreSession, PausedAndAbortedSessionsResumeDoneAndWithdrawnOnesDoNot) {
+TEST_F(StoreSession, OnlyPausedAndAbortedSessionsResume) {
   Store store = open();
   const Participant person = store.enrol(a_protocol(), "A");
   int session = 0;
@@ -136,7 +136,7 @@ TEST_F(StoreSession, ARunEndsOnceAndTakesNothingAfterwards) {
   EXPECT_THROW(store.cut_off_attempt(run, "x"), StoreRefused);
 }
 
-TEST_F(StoreSession, ATrialHasOneRecordAndOneOpenAttempt) {
+TEST_F(StoreSession, TrialsHaveOneRecordAndOneOpenAttempt) {
   Store store = open();
   const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), "A"), a_run());
   show(store, run, 1);
@@ -152,7 +152,7 @@ TEST_F(StoreSession, ATrialHasOneRecordAndOneOpenAttempt) {
       << "another session than the run's";
 }
 
-TEST_F(StoreSession, ARecordOfAnotherTrialThanWasBegunIsRefused) {
+TEST_F(StoreSession, RefusesRecordsOfAnotherTrialThanBegun) {
   Store store = open();
   const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), "A"), a_run());
   store.begin_attempt(run, a_plan(1), 1);
@@ -194,7 +194,7 @@ TEST_F(StoreSession, SimulatedTrialsComeAllOrNone) {
   EXPECT_EQ(store.counts().cut_off, 0);
 }
 
-TEST_F(StoreSession, ARealParticipantsTrialsAreNotStoredInBulk) {
+TEST_F(StoreSession, RealParticipantsTrialsAreNotStoredInBulk) {
   Store store = open();
   const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), "A"), a_run());
   EXPECT_THROW(store.record_simulated(run, {a_record(1)}), StoreRefused);
@@ -213,7 +213,7 @@ TEST_F(StoreSession, ASimulatedSessionKeepsItsObserver) {
       << "a real one has none";
 }
 
-TEST_F(StoreSession, TrialsComeByProtocolNumberSessionAndTrialWhateverTheOrderOfWriting) {
+TEST_F(StoreSession, TrialsComeByProtocolNumberSessionAndTrial) {
   Store store = open();
   const Participant late = store.enrol(a_protocol(), "Late", 2);
   const Participant early = store.enrol(a_protocol(), "Early", 1);

@@ -66,7 +66,7 @@ std::vector<SampleRecord> a_stroke(int ticks) {
   return samples;
 }
 
-TEST(SamplesCodec, BodiesComeBackAndOtherSamplesKeepTheirPacking) {
+TEST(SamplesCodec, BodiesComeBackOtherSamplesKeepTheirPacking) {
   constexpr std::uint64_t kSeed = 4;
   std::mt19937_64 random(kSeed);
   std::vector<SampleRecord> samples = a_stroke(50);
@@ -163,7 +163,7 @@ TEST(SamplesCodec, TheFirstPackingIsReadWithoutPeriods) {
   EXPECT_THROW(unpack_samples(packed, sizeof packed, 2, 2), StoreError);
 }
 
-TEST(SamplesCodec, TheSecondPackingIsReadWithoutLatenessAndCommands) {
+TEST(SamplesCodec, SecondPackingIsReadWithoutLatenessAndCommands) {
   // Two samples of packing 2, made from its description by another program.
   const unsigned char packed[] = {
       0x78, 0x5e, 0x63, 0x60, 0x00, 0x03, 0x46, 0x08, 0x05, 0x02, 0xfc, 0x0c, 0x4e, 0x8c, 0x0e,
@@ -188,7 +188,7 @@ TEST(SamplesCodec, TheSecondPackingIsReadWithoutLatenessAndCommands) {
   EXPECT_THROW(unpack_samples(packed, sizeof packed, 2, 3), StoreError);
 }
 
-TEST(SamplesCodec, AnAbsurdCountIsRefusedBeforeMemoryIsAskedFor) {
+TEST(SamplesCodec, RefusesAbsurdCountsBeforeAllocating) {
   const std::string packed = pack_samples(a_stroke(10)).bytes;
   EXPECT_THROW(unpack_samples(packed.data(), packed.size(), 99'999'999), StoreError);
   const std::vector<SampleRecord> still(200'000);  // the smallest packed samples
@@ -291,7 +291,7 @@ TEST(SamplesCodec, MemoryIsInProportionToTheBytes) {
   EXPECT_LT(*most, 100U << 20U);
 }
 
-TEST(SamplesCodec, ALongStandstillIsStoredSoThatItIsReadAgain) {
+TEST(SamplesCodec, LongStandstillsAreStoredAndReadAgain) {
   constexpr std::size_t kTicks = 450'000;
   const auto [packing, packed] = pack_samples(std::vector<SampleRecord>(kTicks));
   EXPECT_EQ(packing, 3);

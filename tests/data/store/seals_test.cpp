@@ -173,7 +173,7 @@ TEST_F(Seals, AChangedSessionIsNotResumed) {
   EXPECT_EQ(store.progress(other, 1).completed.size(), 2u) << "of others nothing is asked";
 }
 
-TEST_F(Seals, RowsOfACrashedProcessAreSealedByTheNextWriter) {
+TEST_F(Seals, NextWriterSealsRowsOfACrashedProcess) {
   {
     Store store = open();
     const palpate::data::Run run = store.begin_run(store.enrol(a_protocol(), "P3"), a_run());
@@ -210,7 +210,7 @@ TEST_F(Seals, OthersStayWholeWhenOneIsForgotten) {
   expect_refused("UPDATE attempts SET correct = 1 WHERE trial = 1", "participant S1");
 }
 
-TEST_F(Seals, AMergedDatabaseHasTheSealsOfItsStations) {
+TEST_F(Seals, MergedDatabasesKeepTheirStationsSeals) {
   merge(folder_ / "merged.db", {path_});
   original_ = contents_of(folder_ / "merged.db");
   edit("SELECT 1");

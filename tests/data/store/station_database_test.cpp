@@ -50,7 +50,7 @@ TEST_F(Merging, AnInputThatIsBeingWrittenIsRefused) {
   EXPECT_TRUE(contains(refusal_while_locked({a_}), "open for writing in process"));
 }
 
-TEST_F(Merging, ReadsTheDatabaseOfACrashedWriterWithoutChangingIt) {
+TEST_F(Merging, ReadsCrashedWritersDatabaseWithoutChangingIt) {
   {
     Store a = open_station(a_);
     const palpate::data::Run run = a.begin_run(a.enrol(a_protocol(), "P1"), a_run());

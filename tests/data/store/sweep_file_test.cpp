@@ -80,7 +80,7 @@ TEST_F(Sweeps, RefusesANewNameOfAnOpenFile) {
   expect_refused([&] { SweepFile::open(second, a_sweep_plan()); }, "under another name");
 }
 
-TEST_F(Sweeps, EveryPointIsVisitedOnceInOrderHoweverManyThereAre) {
+TEST_F(Sweeps, VisitsEveryPointOnceInOrder) {
   for (const std::int64_t points : {1, 999, 1000, 1001, 2000, 2500}) {
     const std::string path = folder_ / (std::to_string(points) + ".sweep");
     std::vector<SweepRow> rows;
@@ -95,7 +95,7 @@ TEST_F(Sweeps, EveryPointIsVisitedOnceInOrderHoweverManyThereAre) {
   }
 }
 
-TEST_F(Sweeps, BytesOfAFinishedFileDependOnThePlanAndTheResultsAlone) {
+TEST_F(Sweeps, BytesDependOnPlanAndResultsAlone) {
   make_sweep(path_, {1, 2, 3, 4, 5}, true);
   make_sweep(folder_ / "b.sweep", {5, 3}, false);
   make_sweep(folder_ / "b.sweep", {1, 4, 2}, true);
@@ -127,7 +127,7 @@ std::string readable(const std::string& path) {
   }
 }
 
-TEST_F(Sweeps, AFlippedBitIsRefusedWithTheRowsNumber) {
+TEST_F(Sweeps, RefusesFlippedBitsNamingTheRow) {
   for (const auto& [sql, said] :
        {std::pair("UPDATE points SET time_ray_hat = time_ray_hat + 1e-9 WHERE point = 3",
                   "point 3 does not match its checksum"),
@@ -185,7 +185,7 @@ void make_version_1(const std::string& path, const std::string& from) {
   old.exec("PRAGMA user_version = 1");
 }
 
-TEST_F(Sweeps, FilesOfVersion1AreReadAndSealedWhenResumed) {
+TEST_F(Sweeps, ReadsVersion1AndSealsItWhenResumed) {
   make_sweep(folder_ / "b.sweep", {1, 2, 4}, true);
   make_version_1(path_, folder_ / "b.sweep");
   EXPECT_EQ(readable(path_), readable(folder_ / "b.sweep"));
@@ -209,7 +209,7 @@ TEST_F(Sweeps, ValuesAreSealedAsSQLiteStoresThem) {
   EXPECT_EQ(rows_of(file)[0].figures[1], std::nullopt);
 }
 
-TEST_F(Sweeps, RowsThatDoNotFitThePlanAreRefusedAndNotRecorded) {
+TEST_F(Sweeps, RefusesRowsThatDoNotFitThePlan) {
   SweepFile file = SweepFile::open(path_, a_sweep_plan());
   file.record({a_sweep_row(1)});
   EXPECT_THROW(file.record({a_sweep_row(2), a_sweep_row(1)}), StoreError);
@@ -237,7 +237,7 @@ TEST_F(Sweeps, AnotherPlanIsRefusedWithEveryDifference) {
                  R"(shapes: ["ball","hat"] and ["ball","cap"])");
 }
 
-TEST_F(Sweeps, ElementsAppendedToAListAreNamedWithTheirPlaceAndValue) {
+TEST_F(Sweeps, NamesAppendedElementsWithPlaceAndValue) {
   SweepPlan one = a_sweep_plan(), two = one;
   one.space = R"({"parameters": [{"name": "a"}], "-": 1})";
   two.space = R"({"parameters": [{"name": "b"}, {"name": "c"}, 5], "-": 2})";
@@ -259,7 +259,7 @@ TEST_F(Sweeps, ElementsAppendedToAListAreNamedWithTheirPlaceAndValue) {
   EXPECT_EQ(differences(one, two)[0], "space: their layout alone");
 }
 
-TEST_F(Sweeps, NamesOfParametersColumnsAndShapesAreToldApart) {
+TEST_F(Sweeps, TellsNamesOfParametersColumnsAndShapesApart) {
   SweepPlan plan = a_sweep_plan();
   EXPECT_FALSE(columns_alike(plan));
   for (const char* const taken :
@@ -297,7 +297,7 @@ TEST_F(Sweeps, PointsAreRecordedWhileAReaderVisitsThem) {
 }
 
 // Longer than five seconds, a common timeout of SQLite's users.
-TEST_F(Sweeps, AReaderOfAnotherProgramThatTakesSecondsDoesNotEndTheWriter) {
+TEST_F(Sweeps, WriterSurvivesSlowReadersOfOtherPrograms) {
   SweepFile writer = SweepFile::open(path_, a_sweep_plan());
   writer.record({a_sweep_row(1), a_sweep_row(2)});
   SQLite::Database other(path_, SQLite::OPEN_READONLY);

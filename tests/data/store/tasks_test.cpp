@@ -110,7 +110,7 @@ TEST(Tasks, AreKeptToTheBit) {
   }
 }
 
-TEST(Tasks, OfACutOffAttemptNameTheStimulus) {
+TEST(Tasks, CutOffAttemptsNameTheStimulus) {
   const TemporaryFolder folder;
   Store store = Store::open(folder / "a.db", Store::Mode::write_or_create);
   const auto run = store.begin_run(store.enrol(a_protocol(), "P1"), a_run());
@@ -127,7 +127,7 @@ TEST(Tasks, OfACutOffAttemptNameTheStimulus) {
   EXPECT_EQ(seen, 1);
 }
 
-TEST(Tasks, OfNoBlockAreIdentificationAndStoreNothing) {
+TEST(Tasks, NoBlockMeansIdentificationAndStoresNothing) {
   const TemporaryFolder folder;
   Store store = Store::open(folder / "a.db", Store::Mode::write_or_create);
   const auto run = store.begin_run(store.enrol(a_protocol(), "P1"), a_run());
@@ -200,7 +200,7 @@ TEST(PageAnswers, StayOnRecordWhenTheyAreCorrected) {
   EXPECT_EQ(refusal_of(folder / "a.db"), "");
 }
 
-TEST(PageAnswers, GoAlongInAMergeAndAreForgottenWithTheirParticipant) {
+TEST(PageAnswers, AreMergedAndForgottenWithTheirParticipant) {
   const TemporaryFolder folder;
   record_study(folder / "a.db", "P1", 1);
   record_study(folder / "b.db", "P2", 2);

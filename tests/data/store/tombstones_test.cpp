@@ -31,7 +31,7 @@ TEST(Tombstone, CodesCannotBeGuessedWithoutTheSecret) {
   EXPECT_FALSE(Tombstones::read(db, path).holds("P07"));
 }
 
-TEST(Tombstone, SeveralStationsAreAllHonouredByAMergeAndByMergesOfIt) {
+TEST(Tombstone, MergesOfMergesHonourAllStations) {
   const TemporaryFolder folder;
   const std::string a = folder / "a.db", b = folder / "b.db", c = folder / "c.db";
   for (const auto& [path, gone, number] : {std::tuple(a, "P1", 1), std::tuple(b, "P2", 2)}) {
@@ -53,7 +53,7 @@ TEST(Tombstone, SeveralStationsAreAllHonouredByAMergeAndByMergesOfIt) {
   }
 }
 
-TEST(Tombstone, OneWithoutASecretGetsItWhenTheCodeIsForgottenAgain) {
+TEST(Tombstone, GetsAMissingSecretWhenForgottenAgain) {
   const TemporaryFolder folder;
   const std::string path = folder / "s.db";
   {
