@@ -5,7 +5,7 @@
 namespace palpate::protocols {
 namespace {
 
-TEST(AnswerKeys, ArePressedOrRefusedWithTheListOfNames) {
+TEST(AnswerKeys, ArePressedOrRefusedWithTheNames) {
   for (const char* const name : {"1", "a", "A", "/", "~", "\u00e4", "\u00c4", "\u0436", "space",
                                  "enter", "tab", "backspace", "left", "right", "up", "down"})
     EXPECT_EQ(key_fault(name), "") << name;

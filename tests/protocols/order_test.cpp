@@ -231,7 +231,7 @@ void expect_equally_likely(const Case& c, std::uint64_t seed, std::size_t budget
 }
 
 // A session resumed with a newer program must keep its order.
-TEST(Order, StaysTheSameFromOneVersionOfTheProgramToTheNext) {
+TEST(Order, StaysTheSameAcrossVersionsOfTheProgram) {
   constexpr std::uint64_t kSeed = 5;
   Random one(kSeed), two(kSeed), three(kSeed);
   EXPECT_EQ(order_block({6, 6, 6}, limits(1), kNames, one, 0),

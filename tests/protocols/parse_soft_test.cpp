@@ -62,7 +62,7 @@ TEST(ParseSoft, NumbersKeepToThePublishedBounds) {
     EXPECT_EQ(faults_with(json::object(), wrong), Places{"/stimuli/0/stiffness_n_per_m"});
 }
 
-TEST(ParseSoft, HeldPointsAreOneToAThousandWithinAKilometre) {
+TEST(ParseSoft, HeldPointsAreLimitedInNumberAndDistance) {
   const std::string fixed = kSoft + "/fixed";
   for (const char* word : {"base", "none"}) EXPECT_EQ(faults_with({{"fixed", word}}), Places{});
   EXPECT_EQ(faults_with({{"fixed", "top"}}), Places{fixed});

@@ -247,7 +247,7 @@ TEST(Parse, ReadsASceneWithToolReachAndLayers) {
   EXPECT_EQ(scene.reach->point, Vec3(0, 0.1, 0));
 }
 
-TEST(Parse, AFaultOfAWholeFileHasNoPlace) {
+TEST(Parse, FaultsOfWholeFilesHaveNoPlace) {
   EXPECT_STREQ(InputError({{"none", "", "expected a firmware file"}}).what(),
                "none: expected a firmware file");
 }
@@ -386,7 +386,7 @@ TEST(Parse, SurvivesDamage) {
   EXPECT_GT(refused, 1000);
 }
 
-TEST(MeshFiles, AreReadWithTheProtocolAndStoredOnesStandIn) {
+TEST(MeshFiles, StoredOnesStandInForMissingOnes) {
   const std::string text =
       R"({"version": 1, "name": "own", "renderers": ["point"], "repetitions": 1,
           "stimuli": [{"name": "wedge", "shape": "mesh", "file": "no-such-folder/wedge.obj"}],

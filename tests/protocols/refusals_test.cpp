@@ -41,7 +41,7 @@ TEST(Refusals, AreWholeSentencesWithAnExpectation) {
   EXPECT_GT(count, 250);
 }
 
-TEST(Refusals, AThickToolNeedsASoftObjectAndASoftObjectAThickTool) {
+TEST(Refusals, ThickToolsAndSoftObjectsNeedEachOther) {
   const auto refusal = [](double radius, const std::string& object) {
     const std::vector<Fault> faults =
         faults_of_scene(R"({"objects": [{"shape": "cube", "edge_m": 0.05)" + object +

@@ -145,7 +145,7 @@ TEST(Schedule, InterleavedMixesRenderersWithinBlocks) {
   }
 }
 
-TEST(Schedule, SequentialInterleavedShowsAllStimuliWithEachRendererInTurn) {
+TEST(Schedule, SequentialInterleavedShowsAllStimuliPerRenderer) {
   Protocol protocol = ho2000();
   protocol.renderer_order = RendererOrder::interleaved;
   protocol.order = {OrderKind::sequential, 1, 4};
@@ -189,7 +189,7 @@ TEST(Schedule, PracticeComesBeforeEachRenderersFirstBlock) {
   }
 }
 
-TEST(Schedule, FurtherRoundsOfPracticeDifferAndHoldTheLimits) {
+TEST(Schedule, FurtherPracticeRoundsDifferWithinTheLimits) {
   Protocol protocol = ho2000();
   protocol.practice.repetitions = 5;
   protocol.order.max_run = 1;

@@ -230,15 +230,15 @@ int expect_defaults(const std::map<std::string, json>& keys) {
   return count;
 }
 
-TEST(Defaults, OfAProtocolAreTheSchemas) { EXPECT_GE(expect_defaults(keys_of_a_protocol()), 33); }
+TEST(Defaults, MatchTheSchemasProtocol) { EXPECT_GE(expect_defaults(keys_of_a_protocol()), 33); }
 
-TEST(Defaults, OfAnObjectAreTheSchemas) { EXPECT_GE(expect_defaults(keys_of_an_object()), 10); }
+TEST(Defaults, MatchTheSchemasObject) { EXPECT_GE(expect_defaults(keys_of_an_object()), 10); }
 
-TEST(Defaults, OfToolAndReachAreTheSchemas) {
+TEST(Defaults, MatchTheSchemasToolAndReach) {
   EXPECT_GE(expect_defaults(keys_of_tool_and_reach()), 1);
 }
 
-TEST(Defaults, OfAMissingSectionAreThoseOfAnEmptyOne) {
+TEST(Defaults, MissingSectionsActAsEmptyOnes) {
   for (const char* section : {"order", "sessions", "breaks", "stylus", "workspace", "material",
                               "servo", "home", "texts"}) {
     json empty = kShapes;
@@ -247,7 +247,7 @@ TEST(Defaults, OfAMissingSectionAreThoseOfAnEmptyOne) {
   }
 }
 
-TEST(Defaults, PracticeWithACriterionHasFiveRoundsElseOne) {
+TEST(Defaults, CriterionGivesPracticeFiveRoundsElseOne) {
   json document = kShapes;
   EXPECT_EQ(parse_protocol_text(document.dump(), "p.json").practice.max_rounds, 1);
   document["practice"]["criterion"] = 0.8;
@@ -336,11 +336,11 @@ int expect_bounds(const std::map<std::string, json>& keys) {
   return count;
 }
 
-TEST(Bounds, OfAProtocolAreTheSchemas) { EXPECT_GE(expect_bounds(keys_of_a_protocol()), 40); }
+TEST(Bounds, MatchTheSchemasProtocol) { EXPECT_GE(expect_bounds(keys_of_a_protocol()), 40); }
 
-TEST(Bounds, OfAnObjectAreTheSchemas) { EXPECT_GE(expect_bounds(keys_of_an_object()), 24); }
+TEST(Bounds, MatchTheSchemasObject) { EXPECT_GE(expect_bounds(keys_of_an_object()), 24); }
 
-TEST(Bounds, OfToolAndReachAreTheSchemas) { EXPECT_GE(expect_bounds(keys_of_tool_and_reach()), 6); }
+TEST(Bounds, MatchTheSchemasToolAndReach) { EXPECT_GE(expect_bounds(keys_of_tool_and_reach()), 6); }
 
 }  // namespace
 }  // namespace palpate::protocols

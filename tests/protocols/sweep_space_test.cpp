@@ -123,7 +123,7 @@ double cut_share(double low, double high, double z) {
   return below / whole;
 }
 
-TEST(SweepSpace, TailsOfNormalDistributionsFarFromTheMeanAreRight) {
+TEST(SweepSpace, FarTailsOfNormalDistributionsAreRight) {
   for (const auto& [low, high] :
        {std::pair(36.9, 60.0), std::pair(20.0, 20.01), std::pair(8.0, 1e6), std::pair(-3.0, 1e300),
         std::pair(5.0, 5 + 1e-9), std::pair(0.0, 1e-12), std::pair(-1e-13, 1e-13)}) {
@@ -141,7 +141,7 @@ TEST(SweepSpace, TailsOfNormalDistributionsFarFromTheMeanAreRight) {
 }
 
 // A uniform logarithm: equal shares are equal ratios, whatever the ratio of the limits.
-TEST(SweepSpace, LogUniformLimitsMayBeAnyNumberOfDecadesApart) {
+TEST(SweepSpace, LogUniformLimitsMayBeManyDecadesApart) {
   for (const double low : {1e-3, 1e-300, 1e-310}) {
     const SweepParameter one = with_limits(DistributionKind::log_uniform, low, 1e12);
     for (const double share : {0.0, 0.01, 0.25, 0.5, 0.75, 0.99, 1.0}) {

@@ -113,7 +113,7 @@ TEST(ClosedSurfaceTest, ASurfaceOfTrianglesIsKeptUnchanged) {
 }
 
 // Any outline, so concave, and with hundreds of corners.
-TEST(ClosedSurfaceTest, FacesOfAnyOutlineAreCutIntoTrianglesOfTheSameVolume) {
+TEST(ClosedSurfaceTest, CutsFacesIntoTrianglesOfTheSameVolume) {
   constexpr std::uint64_t kSeed = 5;
   Random random(kSeed);
   for (int i = 0; i < 200; ++i) {
@@ -206,7 +206,7 @@ TEST(ClosedSurfaceTest, NotesHowFarCornersMoved) {
 }
 
 // A face with a bridge to its hole visits two corners twice.
-TEST(ClosedSurfaceTest, AFaceWithABridgeToAHoleIsAccepted) {
+TEST(ClosedSurfaceTest, AcceptsFacesWithABridgeToAHole) {
   PolygonSoup soup;
   for (const double z : {0.0, 0.01}) {
     for (const double r : {0.03, 0.01}) {
@@ -226,7 +226,7 @@ TEST(ClosedSurfaceTest, AFaceWithABridgeToAHoleIsAccepted) {
   EXPECT_NEAR(volume_in(cleaned.surface), 0.01 * (0.06 * 0.06 - 0.02 * 0.02), 1e-15);
 }
 
-TEST(ClosedSurfaceTest, TrianglesWithoutAreaAreRemovedAndTheSurfaceStaysClosed) {
+TEST(ClosedSurfaceTest, RemovesTrianglesWithoutAreaAndStaysClosed) {
   constexpr std::uint64_t kSeed = 9;
   Random random(kSeed);
   for (int i = 0; i < 100; ++i) {
@@ -258,7 +258,7 @@ TEST(ClosedSurfaceTest, TrianglesWithoutAreaAreRemovedAndTheSurfaceStaysClosed) 
   }
 }
 
-TEST(ClosedSurfaceTest, FacesBackToBackAndCornersOfNoFaceAreLeftOut) {
+TEST(ClosedSurfaceTest, LeavesOutDoubledFacesAndUnusedCorners) {
   PolygonSoup soup = cube(0.04);
   soup.vertices.emplace_back(1, 1, 1);
   soup.faces.push_back({0, 1, 6});
@@ -285,7 +285,7 @@ TEST(ClosedSurfaceTest, CornersAreWeldedByPlaceNotByDistance) {
   EXPECT_EQ(closed_surface(tiny).surface.vertices.size(), 8U);
 }
 
-TEST(ClosedSurfaceTest, CornersThatDifferInTheLastDigitAreWeldedOnlyOnOpenEdges) {
+TEST(ClosedSurfaceTest, WeldsNearlyEqualCornersOnlyOnOpenEdges) {
   constexpr std::uint64_t kSeed = 11;
   Random random(kSeed);
   PolygonSoup apart;
@@ -310,7 +310,7 @@ TEST(ClosedSurfaceTest, CornersThatDifferInTheLastDigitAreWeldedOnlyOnOpenEdges)
   EXPECT_NE(notes_of(cleaned).find("on an open edge merged with another"), std::string::npos);
 }
 
-TEST(ClosedSurfaceTest, AnEdgeIsCutAtACornerOfANeighbourThatLiesOnIt) {
+TEST(ClosedSurfaceTest, CutsEdgesAtNeighboursCornersOnThem) {
   constexpr std::uint64_t kSeed = 13;
   Random random(kSeed);
   for (int i = 0; i < 50; ++i) {
@@ -349,7 +349,7 @@ TEST(ClosedSurfaceTest, ShellsMayOverlapAbutAndTouch) {
 
 // Solid must lie between neighbours; otherwise a segment could pass through an edge that two shells
 // share.
-TEST(ClosedSurfaceTest, AtAnEdgeOfTwoShellsNeighboursHaveSolidBetweenThem) {
+TEST(ClosedSurfaceTest, EdgesOfTwoShellsPairNeighboursAcrossSolid) {
   PolygonSoup soup = cube(0.04);
   add_shell(soup, shifted(cube(0.04), Vec3(0.04, 0.04, 0)));
   const ClosedSurface surface = closed_surface(soup).surface;
@@ -364,7 +364,7 @@ TEST(ClosedSurfaceTest, AtAnEdgeOfTwoShellsNeighboursHaveSolidBetweenThem) {
   }
 }
 
-TEST(ClosedSurfaceTest, ACavityIsAcceptedAndAnInvertedShellElsewhereIsRefused) {
+TEST(ClosedSurfaceTest, AcceptsCavitiesAndRefusesInvertedShells) {
   PolygonSoup cavity = cube(0.04);
   add_shell(cavity, turned_over(cube(0.02)));
   EXPECT_NEAR(volume_in(closed_surface(cavity).surface), 0.000064 - 0.000008, 1e-15);
@@ -384,7 +384,7 @@ TEST(ClosedSurfaceTest, ACavityIsAcceptedAndAnInvertedShellElsewhereIsRefused) {
 }
 
 // A dent pushed out through the far side leaves a region of negative winding.
-TEST(ClosedSurfaceTest, ASmallRegionOfNegativeWindingIsFoundInALargeMesh) {
+TEST(ClosedSurfaceTest, FindsSmallNegativeWindingInALargeMesh) {
   PolygonSoup sphere = icosphere(0.03, 4);
   EXPECT_EQ(refusal_of(sphere), "");
   const Vec3 dent = sphere.vertices[0];
@@ -473,7 +473,7 @@ TEST(ClosedSurfaceTest, FacesOfManyTrianglesAreTaken) {
 }
 
 // In any place, boxes around long bars meet everywhere.
-TEST(ClosedSurfaceTest, ManyBarsThatPassThroughEachOtherAreTaken) {
+TEST(ClosedSurfaceTest, TakesManyBarsThatPassThroughEachOther) {
   constexpr std::uint64_t kSeed = 8;
   Random random(kSeed);
   const Quat turn = uniform_rotation(random);
@@ -494,7 +494,7 @@ TEST(ClosedSurfaceTest, ManyBarsThatPassThroughEachOtherAreTaken) {
   EXPECT_EQ(refusal_of(soup), "");
 }
 
-TEST(ClosedSurfaceTest, SurfacesThatAreNotClosedAreRefusedWithPlaceAndAdvice) {
+TEST(ClosedSurfaceTest, RefusesOpenSurfacesWithPlaceAndAdvice) {
   PolygonSoup soup = cube(0.04);
   soup.faces.pop_back();
   const std::string open = refusal_of(soup);

@@ -185,7 +185,7 @@ TEST(ConvexMeshFaults, NamesAVertexWhereTheSurfaceMeetsItself) {
 }
 
 // A hollow of so many strips that each fold between them is within the error of the corners.
-TEST(ConvexMeshFaults, FindsAHollowWhoseFoldsAreWithinTheError) {
+TEST(ConvexMeshFaults, FindsAHollowWithFoldsWithinTheError) {
   constexpr std::uint32_t kStrips = 200;
   PolygonSoup soup;
   soup.coordinate_error = 1e-6;
@@ -297,7 +297,7 @@ TEST(ConvexMeshFaults, NamesAnEmptySoup) {
   EXPECT_FAULT(soup, "empty");
 }
 
-TEST(ConvexMeshFaults, ListsEveryKindButOnlyTheFirstOfEach) {
+TEST(ConvexMeshFaults, ListsOnlyTheFirstOfEveryKind) {
   PolygonSoup soup = icosphere(0.03, 3);
   std::reverse(soup.faces[100].begin(), soup.faces[100].end());
   soup.faces.resize(soup.faces.size() - 50);

@@ -265,7 +265,7 @@ TEST(ConvexMesh, HullsOfCrowdedPointsAreNotRefused) {
 
 // A file's digits round the corners of a crowd. Some faces then are dents, indistinguishable from
 // flat, and the hull of the corners is meant.
-TEST(ConvexMesh, HullsOfCrowdedAndRoundedPointsAreNotRefused) {
+TEST(ConvexMesh, AcceptsHullsOfCrowdedAndRoundedPoints) {
   for (const double spread : {0.1, 0.03, 0.01, 3e-3, 1e-3}) {
     for (std::uint64_t seed = 1; seed < 6; ++seed) {
       Random random(seed, {78});

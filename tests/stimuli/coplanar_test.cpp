@@ -14,7 +14,7 @@
 namespace palpate::stimuli {
 namespace {
 
-TEST(CoplanarRegions, AreNumberedInTheOrderOfTheirFirstFaces) {
+TEST(CoplanarRegions, AreNumberedInOrderOfTheirFirstFaces) {
   // Sides of unequal area: regions grow from the largest, but are not numbered so.
   PolygonSoup soup = testing::triangulated(box(Vec3(0.01, 0.02, 0.04)));
   for (std::size_t turn = 0; turn < soup.faces.size(); ++turn) {

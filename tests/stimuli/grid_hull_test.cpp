@@ -63,7 +63,7 @@ TEST(GridHull, GivesTheDepthOfPoints) {
   EXPECT_EQ(grid_hull(points, 1e-9).soup.faces.size(), 12U);
 }
 
-TEST(GridHull, OfFlatPointsIsEmpty) {
+TEST(GridHull, FlatPointsHaveNoHull) {
   std::vector<Vec3> points{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   EXPECT_TRUE(grid_hull(points, 1e-9).soup.faces.empty());
   points.emplace_back(1, 1, 0);

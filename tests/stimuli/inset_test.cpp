@@ -132,7 +132,7 @@ TEST(Inset, IsEmptyFromTheInradiusOn) {
   }
 }
 
-TEST(Inset, TheLargestBallIsInsideAndNoneIsLarger) {
+TEST(Inset, LargestBallIsInsideAndNoneIsLarger) {
   constexpr std::uint64_t kSeed = 33;
   Random random(kSeed);
   for (int body = 0; body < 30; ++body) {
@@ -167,7 +167,7 @@ TEST(Inset, TheLargestBallIsInsideAndNoneIsLarger) {
   }
 }
 
-TEST(Inset, OfACubeIsACube) {
+TEST(Inset, CubeStaysACube) {
   constexpr std::uint64_t kSeed = 34;
   Random random(kSeed);
   const Quat rotation = uniform_rotation(random);
@@ -181,7 +181,7 @@ TEST(Inset, OfACubeIsACube) {
   }
 }
 
-TEST(Inset, OfAConeIsAConeWithinTheSameBall) {
+TEST(Inset, ConeStaysAConeWithinTheSameBall) {
   const ConvexMesh mesh(cone(0.03, 0.06, 64));
   const Ball ball = largest_inscribed_ball(mesh);
   // Apothem a and height h: in the section through a side's middle, r = a h / (a + slant).
@@ -199,7 +199,7 @@ TEST(Inset, OfAConeIsAConeWithinTheSameBall) {
   }
 }
 
-TEST(Inset, OfACylinderIsNarrowerAndLower) {
+TEST(Inset, CylinderGetsNarrowerAndLower) {
   const ConvexMesh mesh(cylinder(0.03, 0.05, 64));
   const auto in = inset(mesh, 0.004);
   ASSERT_TRUE(in);
@@ -211,7 +211,7 @@ TEST(Inset, OfACylinderIsNarrowerAndLower) {
   }
 }
 
-TEST(Inset, OfASphereIsAsDefinedHoweverLittleItsFacetsMove) {
+TEST(Inset, SphereIsAsDefinedHoweverLittleFacetsMove) {
   for (const int subdivisions : {0, 2, 4}) {
     const ConvexMesh mesh(icosphere(0.03, subdivisions));
     for (const double depth : {1e-12, 1e-9, 1e-6, 1e-3, 0.02}) {
@@ -223,7 +223,7 @@ TEST(Inset, OfASphereIsAsDefinedHoweverLittleItsFacetsMove) {
   }
 }
 
-TEST(Inset, OfAPlateStaysAPlate) {
+TEST(Inset, PlateStaysAPlate) {
   constexpr std::uint64_t kSeed = 35;
   Random random(kSeed);
   const ConvexMesh mesh(turned(cylinder(0.03, 0.002, 64), uniform_rotation(random)));

@@ -23,7 +23,7 @@ std::pair<Faces, Faces> halves_of_a_box(PlaneTable& planes) {
   return {halves.below.faces, halves.above.faces};
 }
 
-TEST(MergeConvexNeighbours, HalvesOfABoxBecomeTheBoxWhateverTheOrderOfTheirFaces) {
+TEST(MergeConvexNeighbours, HalvesBecomeTheBoxInAnyFaceOrder) {
   PlaneTable planes(1e-9);
   auto [below, above] = halves_of_a_box(planes);
   ASSERT_EQ(below.size(), 6U);

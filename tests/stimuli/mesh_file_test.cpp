@@ -117,7 +117,7 @@ std::string as_binary_stl(const PolygonSoup& soup, std::string header = "solid n
 
 std::size_t facets_of(const PolygonSoup& soup) { return ConvexMesh(soup).facets().size(); }
 
-TEST_F(MeshFile, AFileThatIsTooLargeIsRefusedBeforeItIsRead) {
+TEST_F(MeshFile, RefusesTooLargeFilesBeforeReadingThem) {
   const std::string path = write("huge.stl", "");
   std::filesystem::resize_file(path, (std::uintmax_t{1} << 31) + 1);  // uses no disk space
   try {
@@ -147,7 +147,7 @@ TEST_F(MeshFile, ReadsWhatWasWritten) {
   }
 }
 
-TEST_F(MeshFile, ATriangulatedCubeHasSixFacetsInEveryFormat) {
+TEST_F(MeshFile, TriangulatedCubeHasSixFacetsInEveryFormat) {
   constexpr std::uint64_t kSeed = 1;
   Random random(kSeed);
   for (int i = 0; i < 30; ++i) {
@@ -178,7 +178,7 @@ TEST_F(MeshFile, RoundObjectsSurviveTheDigitsOfTheirFiles) {
   }
 }
 
-TEST_F(MeshFile, NeedlesKeepTheirSidesWhenTheFileHasTheDigits) {
+TEST_F(MeshFile, NeedlesKeepTheirSidesGivenEnoughDigits) {
   const PolygonSoup soup =
       placed(triangulated(testing::prism(64, 5e-7, 1)), Quat(0.8, 0.36, 0.48, 0), 1, Vec3(0));
   EXPECT_EQ(facets_of(read("needle.obj", as_obj(soup))), 66U);
@@ -295,7 +295,7 @@ TEST_F(MeshFile, AsciiStlFaultsNameTheLine) {
   EXPECT_EQ(read("a.stl", with("facet", "FACET")).faces.size(), 12U);
 }
 
-TEST_F(MeshFile, ABinaryStlMustHaveTheTrianglesThatItClaims) {
+TEST_F(MeshFile, BinaryStlMustHaveTheTrianglesItClaims) {
   const std::string good = as_binary_stl(triangulated(cube(1)), "x");
   for (const std::string header : {"x", "solid x"}) {
     std::string bytes = as_binary_stl(triangulated(cube(1)), header);
@@ -326,7 +326,7 @@ class MeshFileSurface : public MeshFile {
   }
 };
 
-TEST_F(MeshFileSurface, FaultsOfAnObjHaveItsNumbersAndLines) {
+TEST_F(MeshFileSurface, ObjFaultsNameItsNumbersAndLines) {
   const std::string corners = "# a tetrahedron\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\n";
   EXPECT_EQ(surface_fault("a.obj", corners + "f 1 3 2\nf 1 2 4\n\nf 1 4 3\nf 2 3 4\n"), "none");
   const std::string open = surface_fault("a.obj", corners + "f 1 3 2\nf 1 2 4\n\nf 1 4 3\n");
@@ -346,7 +346,7 @@ TEST_F(MeshFileSurface, FaultsOfAnObjHaveItsNumbersAndLines) {
       << fault;
 }
 
-TEST_F(MeshFileSurface, FaultsOfAnStlHaveItsPlacesAndCoordinates) {
+TEST_F(MeshFileSurface, StlFaultsNameItsPlacesAndCoordinates) {
   PolygonSoup soup = triangulated(cube(1));
   soup.faces.pop_back();
   const std::string ascii = surface_fault("a.stl", as_ascii_stl(soup));

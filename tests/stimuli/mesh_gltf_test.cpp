@@ -54,7 +54,7 @@ TEST(MeshGltf, TransformsOfNodesWithinNodesApply) {
   expect_box(read_mesh("box.gltf", document(matrix)), Vec3(0.06, 0.04, 0.04), Vec3(0.1, -0.3, 0.2));
 }
 
-TEST(MeshGltf, ARotationIsCounterClockwiseSeenAgainstItsAxis) {
+TEST(MeshGltf, RotationIsCounterClockwiseAgainstItsAxis) {
   const auto centre = [](const std::string& rotation) {
     const std::string nodes = R"([{"children": [1], "rotation": )" + rotation +
                               R"(}, {"mesh": 0, "translation": [0.1, 0.2, 0.4]}])";

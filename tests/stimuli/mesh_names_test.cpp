@@ -26,7 +26,7 @@ TEST(MeshNaming, WithoutNamesNumbersCountFromZero) {
   EXPECT_EQ(plain.face(3, {"1", "2", "5"}), "face 3 (vertices 1 2 5)");
 }
 
-TEST(MeshNaming, OfAFileWithLines) {
+TEST(MeshNaming, NamesVerticesAndFacesByLines) {
   const MeshNaming lines = named({{{7, 12}, {8, 13}}, {{3, 20}}, "line", {}});
   EXPECT_EQ(lines.label(1, kPlace), "8");
   EXPECT_EQ(lines.vertex(0, kPlace), "vertex 7 at line 12");
@@ -38,7 +38,7 @@ TEST(MeshNaming, OfAFileWithLines) {
   EXPECT_EQ(lines.face(1, {"7"}), "face (vertices 7)");
 }
 
-TEST(MeshNaming, OfAFileWithPlacesAndOfOneWithoutAny) {
+TEST(MeshNaming, NamesByPlacesOrByNumbersAlone) {
   const MeshNaming places = named({{{4, 1}}, {{6, 0}}, "", {"/meshes/0", "/meshes/1"}});
   EXPECT_EQ(places.vertex(0, kPlace), "vertex 4 of /meshes/1");
   EXPECT_EQ(places.face(0, {"4"}), "face 6 of /meshes/0 (vertices 4)");
@@ -55,7 +55,7 @@ TEST(MeshNaming, ManyCornersAreCutShortAfterEight) {
   EXPECT_EQ(MeshNaming().face(0, nine), "face 0 (vertices 1 2 3 4 5 6 7 8 ...)");
 }
 
-TEST(MeshNames, OfASubsetAreTheChosenOnesInTheirOrder) {
+TEST(MeshNames, SubsetKeepsTheChosenNamesInOrder) {
   const MeshNames all{{{1, 10}, {2, 11}, {3, 12}}, {{7, 20}, {8, 21}}, "byte", {"a"}};
   const MeshNames some = all.subset({2, 0}, {1});
   ASSERT_EQ(some.vertices.size(), 2U);

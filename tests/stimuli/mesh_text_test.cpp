@@ -15,7 +15,7 @@ namespace palpate::stimuli {
 namespace {
 namespace mesh_text {
 
-TEST(MeshText, AWordIsQuotedCutAndWithoutControlCharacters) {
+TEST(MeshText, WordsAreQuotedCutAndWithoutControlCharacters) {
   EXPECT_EQ(in_quotes("nan"), "\"nan\"");
   EXPECT_EQ(in_quotes(""), "\"\"");
   EXPECT_EQ(in_quotes(std::string(40, 'x')), '"' + std::string(40, 'x') + '"');

@@ -26,7 +26,7 @@ TEST(PlaneDeviation, IsTheDistanceThatWouldFlattenIt) {
   EXPECT_EQ(deviation_of(0, tip, 1, 1e-9), 0);
 }
 
-TEST(PlaneDeviation, AllowsForCornersFarPastTheEndsOfTheSide) {
+TEST(PlaneDeviation, AllowsForCornersFarPastTheSidesEnds) {
   EXPECT_NEAR(deviation_of(1e-6, Vec3(10, 1, 0), 1, 1e-9), 50, 1e-3);
   EXPECT_NEAR(deviation_of(1e-6, Vec3(-9, 1, 0), 1, 1e-9), 50, 1e-3);
 }

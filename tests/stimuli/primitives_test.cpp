@@ -31,7 +31,7 @@ TEST(Primitives, VerticesLieOnTheAnalyticSurface) {
   }
 }
 
-TEST(Primitives, IcosphereHasTwentyTimesFourToTheNTriangles) {
+TEST(Primitives, IcosphereTrianglesAreTwentyTimesFourToN) {
   std::size_t triangles = 20;
   for (int n = 0; n <= 5; ++n, triangles *= 4) {
     const PolygonSoup sphere = icosphere(2, n);
@@ -136,7 +136,7 @@ std::string refusal_of(Make&& make) {
   return "taken";
 }
 
-TEST(Primitives, ARefusalNamesTheShapeTheNumberAndWhatItMayBe) {
+TEST(Primitives, RefusalsNameShapeNumberAndAllowedValues) {
   EXPECT_EQ(refusal_of([] { cone(-0.5, 1, 8); }),
             "cone: the radius must be a length above 0 m, not -0.500000");
   EXPECT_EQ(refusal_of([] { cylinder(1, 0, 8); }),

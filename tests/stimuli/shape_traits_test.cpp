@@ -28,7 +28,7 @@ bool depends_on(ShapeKind shape, const Change& change) {
   return before.vertices != after.vertices || before.faces != after.faces;
 }
 
-TEST(ShapeTraits, AreTheLengthsAndNumbersThatTheGeometryDependsOn) {
+TEST(ShapeTraits, AreTheNumbersThatTheGeometryDependsOn) {
   std::set<std::string> names;
   for (const ShapeKind shape : kShapes) {
     const ShapeTraits traits = traits_of(shape);
@@ -49,7 +49,7 @@ TEST(ShapeTraits, AreTheLengthsAndNumbersThatTheGeometryDependsOn) {
   EXPECT_EQ(names.size(), kShapes.size());
 }
 
-TEST(ShapeTraits, AnAnalyticShapeHasASignedDistanceWhichIsZeroOnItsCorners) {
+TEST(ShapeTraits, AnalyticShapesHaveZeroSignedDistanceOnCorners) {
   for (const ShapeKind shape : kShapes) {
     const ShapeTraits traits = traits_of(shape);
     if (!traits.analytic) continue;
@@ -63,7 +63,7 @@ TEST(ShapeTraits, AnAnalyticShapeHasASignedDistanceWhichIsZeroOnItsCorners) {
 }
 
 /// Those of runner/participants/shape_lines.h; other shapes have distances on a grid.
-TEST(ShapeTraits, AFormulaIsOfSpheresConesCylindersAndCubes) {
+TEST(ShapeTraits, SpheresConesCylindersAndCubesHaveFormulas) {
   std::set<std::string> with_formula;
   for (const ShapeKind shape : kShapes) {
     if (traits_of(shape).formula) with_formula.insert(traits_of(shape).name);

@@ -100,7 +100,7 @@ void expect_lipschitz(const Shape& shape, double reach, Random& random) {
   }
 }
 
-TEST(SignedDistance, OfPrimitivesIsTheNearestPoint) {
+TEST(SignedDistance, PrimitivesGiveTheNearestPoint) {
   constexpr std::uint64_t kSeed = 1;
   Random random(kSeed);
   for (const ShapeKind shape : kShapes) {
@@ -109,7 +109,7 @@ TEST(SignedDistance, OfPrimitivesIsTheNearestPoint) {
   }
 }
 
-TEST(SignedDistance, OfPrimitivesHasTheNormalAsGradient) {
+TEST(SignedDistance, PrimitivesHaveTheNormalAsGradient) {
   constexpr std::uint64_t kSeed = 2;
   Random random(kSeed);
   for (const ShapeKind shape : kShapes) {
@@ -152,12 +152,12 @@ TEST(SignedDistance, AtPlacesThatAreKnown) {
   expect_distance(hat, {0, 0, 0}, -0.012, {0.8, 0, 0.6});
 }
 
-TEST(SignedDistance, OfAMeshOrCompoundSpecIsRefused) {
+TEST(SignedDistance, RefusesMeshAndCompoundSpecs) {
   EXPECT_THROW(signed_distance(solid_of(ShapeKind::mesh), Vec3(0)), std::invalid_argument);
   EXPECT_THROW(signed_distance(solid_of(ShapeKind::compound), Vec3(0)), std::invalid_argument);
 }
 
-TEST(SignedDistance, OfPolyhedraIsTheNearestPoint) {
+TEST(SignedDistance, PolyhedraGiveTheNearestPoint) {
   constexpr std::uint64_t kSeed = 3;
   Random random(kSeed);
   for (int i = 0; i < 6; ++i) {
@@ -170,7 +170,7 @@ TEST(SignedDistance, OfPolyhedraIsTheNearestPoint) {
   expect_nearest(ConvexMesh(cone(0.4, 0.8, 7)), 1, random);
 }
 
-TEST(SignedDistance, OfACubeMeshIsThatOfTheCube) {
+TEST(SignedDistance, CubeMeshEqualsTheCube) {
   constexpr std::uint64_t kSeed = 4;
   Random random(kSeed);
   const ConvexMesh mesh(cube(0.06));
@@ -184,7 +184,7 @@ TEST(SignedDistance, OfACubeMeshIsThatOfTheCube) {
 }
 
 // From outside along a corner's axis, the nearest place is the corner itself.
-TEST(SignedDistance, OverACornerItIsTheDistanceOfTheCorner) {
+TEST(SignedDistance, OverACornerIsTheCornersDistance) {
   const ConvexMesh mesh(cube(2));
   for (const Vec3& corner : mesh.vertices()) {
     const SurfaceDistance found = signed_distance(mesh, 3.0 * corner);
@@ -209,7 +209,7 @@ TEST(SignedDistance, OnTheSurfaceTheNormalIsAFacets) {
 }
 
 // An inscribed mesh lies within the analytic shape, and the gap falls with the square of the step.
-TEST(SignedDistance, OfFinerMeshesTendsToThatOfTheShape) {
+TEST(SignedDistance, FinerMeshesTendToTheShapes) {
   constexpr std::uint64_t kSeed = 6;
   Random random(kSeed);
   const auto worst = [&](const ObjectSpec& spec) {

@@ -46,7 +46,7 @@ std::vector<ShownTrial> run_tracks(InterleavedTracks tracks, Random& random) {
   return shown;
 }
 
-TEST(InterleavedProcedures, EveryRoundHasATrialOfEveryUnfinishedTrack) {
+TEST(InterleavedProcedures, RoundsHaveATrialOfEveryUnfinishedTrack) {
   constexpr std::uint64_t kSeed = 5;
   Random random(kSeed);
   const std::vector<ShownTrial> shown = run_tracks({one_of_each(), 3}, random);
@@ -124,7 +124,7 @@ TEST(InterleavedProcedures, TracksOfTheSameGridShareItsTables) {
   EXPECT_LT(*twelve, *one + 12U * 4 * 16000 * sizeof(double));
 }
 
-TEST(InterleavedProcedures, TracksThatShareTablesLearnFromTheirOwnAnswers) {
+TEST(InterleavedProcedures, TracksSharingTablesLearnFromTheirOwnAnswers) {
   const ProcedureSpec quest = one_of_each()[2];
   InterleavedTracks two({quest, quest}, 9);
   Procedure alone[2]{{quest, 1}, {quest, 2}};

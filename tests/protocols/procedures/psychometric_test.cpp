@@ -37,7 +37,7 @@ constexpr PsychometricShape kShapes[] = {PsychometricShape::logistic, Psychometr
                                          PsychometricShape::weibull};
 constexpr LevelScale kScales[] = {LevelScale::linear, LevelScale::log10, LevelScale::decibel};
 
-TEST(Psychometric, WeibullHasTheSameExponentOnBothLogarithmicScales) {
+TEST(Psychometric, WeibullHasOneExponentOnBothLogarithmicScales) {
   const PsychometricParameters parameters{3, 2.5, 0.5, 0.02};
   for (const double level : {0.5, 3.0, 4.0, 20.0}) {
     const double expected = 0.5 + 0.48 * (1 - std::exp(-std::pow(level / 3, 2.5)));
@@ -73,7 +73,7 @@ TEST(Psychometric, LevelOfAShareIsTheInverse) {
   }
 }
 
-TEST(Psychometric, LevelZeroOfALogarithmicScaleGivesTheGuessRate) {
+TEST(Psychometric, LogarithmicLevelZeroGivesTheGuessRate) {
   for (const PsychometricShape shape : kShapes) {
     const PsychometricFunction function{shape, LevelScale::log10};
     EXPECT_EQ(psychometric_probability(function, {1, 3, 0.25, 0.1}, 0), 0.25);

@@ -156,7 +156,7 @@ TEST(QuestPlusProcedure, EquallyGoodLevelsAreChosenInOrder) {
   EXPECT_EQ(QuestPlusRun(spec).next_level(), -2);
 }
 
-TEST(QuestPlusProcedure, RecordsALevelOffTheGridAtItsTrueValue) {
+TEST(QuestPlusProcedure, RecordsLevelsOffTheGridAtTheirValue) {
   QuestPlus spec = small_quest(PsychometricShape::logistic, LevelScale::linear, Easier::higher);
   QuestPlusRun run(spec);
   PlainQuestPlus plain(spec);

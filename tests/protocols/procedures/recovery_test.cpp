@@ -64,7 +64,7 @@ TEST(ProcedureRecovery, StaircasesFindTheirConvergencePoint) {
 
 // Garcia-Perez 1998: in forced choice, these ratios make a staircase converge at the same share of
 // successes for any step size; transformed and weighted staircases in general miss their targets.
-TEST(ProcedureRecovery, RatiosOfGarciaPerezAreNearlyIndifferentToTheStep) {
+TEST(ProcedureRecovery, GarciaPerezRatiosHardlyDependOnTheStep) {
   for (const std::uint64_t seed : {1U, 2U}) {
     const double ratios[] = {0.2845, 0.5488, 0.7393, 0.8415};
     const double shares[] = {0.7785, 0.8035, 0.8315, 0.8584};

@@ -183,7 +183,7 @@ TEST(ExpectedTrials, FollowTheCourseOfAStaircase) {
   EXPECT_EQ(expected_trials(spec, course), 0);
 }
 
-TEST(ExpectedTrials, OfAFixedNumberAreExact) {
+TEST(ExpectedTrials, AreExactForAFixedNumber) {
   Staircase spec = simple_staircase();
   spec.stop_trials = 30;
   Procedure run(spec, 1);

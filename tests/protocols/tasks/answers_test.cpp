@@ -56,7 +56,7 @@ std::vector<std::string> answers_of_block(const std::string& task, const json& m
 
 using Places = std::vector<std::string>;
 
-TEST(Answers, OfAnAdjustmentAreTurnsSwitchAndDone) {
+TEST(Answers, AdjustmentsHaveTurnsSwitchAndDone) {
   const std::vector<std::string> all =
       answers_of_block("adjust", {{"standard", "ball"},
                                   {"level", {{"path", "/stiffness_n_per_m"}}},
@@ -102,7 +102,7 @@ TEST(Answers, EachHasOneKeyAndOneLabel) {
               (Places{keys + "/" + taken}));
 }
 
-TEST(Answers, NamesOfKeysAndLabelsAreShortAndPlain) {
+TEST(Answers, KeysAndLabelsAreShortAndPlain) {
   const auto with_label = [](const std::string& label) {
     return faults_of_block("compare",
                            {{"keys", {{"a", {{"answer", "1"}, {"label", label}}}, {"b", "2"}}}});
@@ -130,7 +130,7 @@ json scale_of(std::size_t steps) {
   return scale;
 }
 
-TEST(Answers, StepsOfAScaleHaveTheKeysOfAKeyboard) {
+TEST(Answers, ScaleStepsHaveKeyboardKeys) {
   EXPECT_EQ(
       answers_of_block("rate", {{"scale", scale_of(11)}}),
       (Places{"1 1 step 1", "2 2 step 2", "3 3 step 3", "4 4 step 4", "5 5 step 5", "6 6 step 6",

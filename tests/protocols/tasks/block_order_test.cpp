@@ -89,7 +89,7 @@ void expect_order(const json& block, std::size_t kinds, int of_each, std::size_t
   EXPECT_EQ(orders.size(), 12U) << "by chance: no two participants alike";
 }
 
-TEST(BlockOrder, KeepsItsLimitsWithOneRendererAndWithTwo) {
+TEST(BlockOrder, KeepsLimitsWithOneAndTwoRenderers) {
   constexpr std::size_t kAny = 1000;
   for (const json& renderers : {json{"ray"}, json{"point", "ray"}}) {
     const std::size_t n = renderers.size();

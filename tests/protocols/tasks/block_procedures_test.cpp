@@ -65,7 +65,7 @@ TEST(BlockProcedures, GiveTheEstimatesOfTheSessionsTracks) {
   EXPECT_EQ(compared, 3U * (2 + 8));
 }
 
-TEST(BlockProcedures, HaveTheQuestionAndTheUnitOfTheLevel) {
+TEST(BlockProcedures, HaveTheQuestionAndUnitOfTheLevel) {
   nlohmann::json document = task_study();
   document["blocks"][0]["asks"] = "smaller";
   document["blocks"].push_back(nlohmann::json::parse(
@@ -78,7 +78,7 @@ TEST(BlockProcedures, HaveTheQuestionAndTheUnitOfTheLevel) {
   EXPECT_EQ(blocks.at("plain").level_unit, "");
 }
 
-TEST(TypicalParticipant, LapsesAtBothEndsWhereLevelsLieOnBothSides) {
+TEST(TypicalParticipant, LapsesAtBothEndsOfTwoSidedLevels) {
   const Protocol protocol = parsed(task_study());
   const TypicalSettings settings{0.5, 0.15, 0.07, 0.03};
   const auto rates = [&](std::size_t block) {

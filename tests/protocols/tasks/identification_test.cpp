@@ -79,7 +79,7 @@ TEST(SessionPlan, IdentifiesUnderTheLimitsOfVersion1) {
   expect_equal_trials(study);
 }
 
-TEST(SessionPlan, IdentifiesWithPracticeAndSeveralBlocksAsInVersion1) {
+TEST(SessionPlan, IdentificationWithPracticeAndBlocksMatchesVersion1) {
   SameStudy study = identification(R"("uniform")");
   study.one["repetitions"] = 10;
   study.one["blocks_per_renderer"] = 2;

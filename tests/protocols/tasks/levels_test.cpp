@@ -52,18 +52,18 @@ json compare(const json& procedure) {
 
 using Levels = std::vector<double>;
 
-TEST(Levels, OfAnAdjustmentAreItsEndsAndItsStarts) {
+TEST(Levels, AdjustmentsHaveEndsAndStarts) {
   EXPECT_EQ(levels_of(protocol_with(adjust(100, 500)).blocks[0]), (Levels{100, 200, 500}));
 }
 
-TEST(Levels, OfConstantStimuliAreEachOnceInOrder) {
+TEST(Levels, ConstantStimuliAppearOnceInOrder) {
   const auto protocol = protocol_with(
       compare({{"kind", "constant"}, {"levels", {400, 200, 300}}, {"repetitions", 2}}));
   EXPECT_EQ(levels_of(protocol.blocks[0]), (Levels{200, 300, 400}));
 }
 
 /// A sphere has a positive and limited size.
-TEST(Levels, AnAdjustmentReachesOnlyWhatTheStimulusCanHave) {
+TEST(Levels, AdjustmentsReachOnlyLevelsTheStimulusAllows) {
   const auto is_refused = [](double least, double most) {
     try {
       protocol_with(adjust(least, most, "/radius_m"));
@@ -78,7 +78,7 @@ TEST(Levels, AnAdjustmentReachesOnlyWhatTheStimulusCanHave) {
   EXPECT_TRUE(is_refused(0.01, 1e6));
 }
 
-TEST(Levels, AStimulusHasItsOwnOrTheDefaultOfItsMaterial) {
+TEST(Levels, StimuliHaveTheirOwnOrMaterialsDefault) {
   const auto own = [](const json& ball, const std::string& path) {
     const Protocol protocol = protocol_with(adjust(0.01, 0.03, "/radius_m"), ball);
     TaskBlock block = protocol.blocks[0];

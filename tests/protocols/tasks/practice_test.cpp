@@ -44,7 +44,7 @@ std::vector<Trial> practice_of(const Protocol& protocol, const std::string& answ
   return shown;
 }
 
-TEST(Practice, EndsOnceEnoughOfTheLastAnswersWereRight) {
+TEST(Practice, EndsOnceEnoughLastAnswersWereRight) {
   const Protocol protocol = practised(R"({"correct": 3, "of": 4})", 30);
   EXPECT_EQ(practice_of(protocol, "1111").size(), 4U);
   EXPECT_EQ(practice_of(protocol, "0111").size(), 4U);

@@ -40,7 +40,7 @@ TEST(SessionPlan, ContinuesTheSameFromAnyTrial) {
   }
 }
 
-TEST(SessionPlan, ShowsEveryConstantLevelEquallyOftenInEitherInterval) {
+TEST(SessionPlan, ShowsConstantLevelsEquallyOftenInEitherInterval) {
   for (const int participant : {1, 2, 17}) {
     std::map<double, int> shown, first;
     double before = 0;

@@ -80,7 +80,7 @@ TEST(Texts, AreAllReplacedButStoredAnswersStay) {
   EXPECT_EQ(protocol.blocks[0].answers[1].label, "T blocks.constant.keys.2");
 }
 
-TEST(Texts, NameEveryKeyThatIsMissingUnknownOrWrong) {
+TEST(Texts, NameEveryMissingUnknownOrWrongKey) {
   json texts = json::parse(texts_json(everything()));
   EXPECT_TRUE(faults_of(texts.dump()).empty());
   texts.erase("texts.go");
@@ -99,7 +99,7 @@ TEST(Texts, NameEveryKeyThatIsMissingUnknownOrWrong) {
   EXPECT_EQ(faults_of("{").size(), 1U);
 }
 
-TEST(Texts, OfThePublishedProtocolAreFoundBesideIt) {
+TEST(Texts, PublishedProtocolHasItsTextsBesideIt) {
   Protocol protocol = parse_protocol(kPublished);
   translate(protocol, kPublished, "de");
   EXPECT_EQ(protocol.texts.go, "Los");
@@ -107,7 +107,7 @@ TEST(Texts, OfThePublishedProtocolAreFoundBesideIt) {
   EXPECT_THROW(translate(protocol, kPublished, "tlh"), InputError);
 }
 
-TEST(Texts, BuiltInOnesAreListedBesideWordsOfTheProtocol) {
+TEST(Texts, ListBuiltInsBesideTheProtocolsWords) {
   Protocol protocol = parse_protocol(PALPATE_SOURCE_DIR "/protocols/quick.json");
   EXPECT_EQ(built_in_texts(protocol),
             (std::vector<std::string>{"texts.move_away", "texts.ready", "texts.go", "texts.wait",
@@ -122,7 +122,7 @@ TEST(Texts, BuiltInOnesAreListedBesideWordsOfTheProtocol) {
   EXPECT_EQ(built_in_texts(protocol).size(), 5U);
 }
 
-TEST(Texts, BuiltInOnesOfTasksAreThoseThatAreRead) {
+TEST(Texts, BuiltInTaskTextsAreThoseRead) {
   const Protocol all = everything();
   const std::vector<std::string> found = built_in_texts(all);
   const auto lists = [&](const std::string& key) {
@@ -143,7 +143,7 @@ TEST(Texts, BuiltInOnesOfTasksAreThoseThatAreRead) {
                                 "blocks.is-it.keys.yes", "blocks.is-it.keys.no"}));
 }
 
-TEST(Texts, OfVersion1AreItsTextsAndLabels) {
+TEST(Texts, Version1HasItsTextsAndLabels) {
   Protocol protocol = parse_protocol(PALPATE_SOURCE_DIR "/protocols/quick.json");
   json texts = json::parse(texts_json(protocol));
   texts["response.keys.cube"] = "W\u00fcrfel";

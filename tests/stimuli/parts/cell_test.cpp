@@ -56,7 +56,7 @@ void expect_closed(const Cell& cell, const PlaneTable& planes) {
   }
 }
 
-TEST(Cell, OfABoxHasItsMeasures) {
+TEST(Cell, BoxHasItsMeasures) {
   PlaneTable planes(kTolerance);
   const Cell cell = box_cell(kLow, kHigh, planes);
   EXPECT_FALSE(cell.empty());
@@ -73,7 +73,7 @@ TEST(Cell, OfABoxHasItsMeasures) {
 }
 
 /// The mean of all faces' corners, each weighted by the number of faces that meet there.
-TEST(Cell, MiddleOfAPyramidIsTheMeanOfItsFacesCorners) {
+TEST(Cell, PyramidsMiddleIsItsFacesCornersMean) {
   const Vec3 a(0, 0, 0), b(2, 0, 0), c(2, 2, 0), d(0, 2, 0), top(1, 1, 3), off(5, 6, 7);
   std::vector<CellPolygon> faces{{{d, c, b, a}, {}},
                                  {{a, b, top}, {}},
@@ -175,7 +175,7 @@ TEST(Cell, StaysClosedHoweverOftenItIsCut) {
 
 /// A plane inside a face by at most the tolerance leaves the cell whole; slightly more cuts off a
 /// slice.
-TEST(Cell, IsLeftWholeByAPlaneWithinTheTolerance) {
+TEST(Cell, PlanesWithinTheToleranceLeaveItWhole) {
   for (const double inside : {-1.0, 0.0, 0.9, 1.1}) {
     for (const double side : {-1.0, 1.0}) {
       PlaneTable planes(kTolerance);
@@ -205,7 +205,7 @@ TEST(Cell, IsLeftWholeByAPlaneWithinTheTolerance) {
   }
 }
 
-TEST(Cell, SurfaceStaysOnItsSideAndIsRemovedInThePlane) {
+TEST(Cell, SurfaceStaysOnItsSideUnlessInPlane) {
   PlaneTable planes(kTolerance);
   Cell cell = box_cell(Vec3(-1), Vec3(1), planes);
   const std::uint32_t cutting =

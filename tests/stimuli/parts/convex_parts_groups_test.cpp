@@ -80,7 +80,7 @@ void add_cube(PolygonSoup& soup, const std::string& name, double edge, const Vec
   soup.group_names.push_back(name);
 }
 
-TEST(ConvexPartsOfGroups, AVoidThatIsAGroupBelongsToTheGroupAroundIt) {
+TEST(ConvexPartsOfGroups, VoidGroupBelongsToTheGroupAroundIt) {
   // In either order; in a shell inside a void of a larger shell, it belongs to the inner shell.
   for (const bool void_first : {false, true}) {
     PolygonSoup soup;
@@ -103,7 +103,7 @@ TEST(ConvexPartsOfGroups, AVoidThatIsAGroupBelongsToTheGroupAroundIt) {
   }
 }
 
-TEST(ConvexPartsOfGroups, AVoidInAShellOfSeveralGroupsBelongsToIt) {
+TEST(ConvexPartsOfGroups, SeveralGroupsShellOwnsItsVoid) {
   PolygonSoup soup;
   add_cube(soup, "sides", 0.06, Vec3(0));
   add_cube(soup, "cavity", 0.02, Vec3(0), true);
@@ -140,7 +140,7 @@ TEST(ConvexPartsOfGroups, ManyGroupsTakeTheirOwnVerticesOnly) {
             "too many groups: expected at most 10000 that are closed by themselves, found more");
 }
 
-TEST(ConvexPartsOfGroups, FacesOfAGroupKeepTheirNumbersInMessages) {
+TEST(ConvexPartsOfGroups, GroupsFacesKeepTheirNumbersInMessages) {
   PolygonSoup soup;
   add_cube(soup, "closed", 0.02, Vec3(0));
   add_cube(soup, "open", 0.02, Vec3(0.1, 0, 0));

@@ -82,7 +82,7 @@ solids::Solid anywhere(const solids::Solid& solid, Random& random) {
   return solids::moved(solid, uniform_rotation(random), scale, by);
 }
 
-TEST(ConvexParts, OfKnownSolids) {
+TEST(ConvexParts, KnownSolidsHaveTheirKnownParts) {
   const auto parts = [](const solids::Solid& solid) {
     const std::vector<ConvexMesh> found = cut_into_convex_parts(solid.soup);
     EXPECT_NEAR(volume(found), solid.volume, 1e-12 * solid.volume);
@@ -109,7 +109,7 @@ TEST(ConvexParts, CornersOfTheSolidStayWhereTheyAre) {
   }
 }
 
-TEST(ConvexParts, OfRandomSolidsAnywhereAtAnyScale) {
+TEST(ConvexParts, CoverRandomSolidsAnywhereAtAnyScale) {
   constexpr std::uint64_t kSeed = 11;
   Random random(kSeed);
   for (int seed = 0; seed < 1000; ++seed) {
@@ -129,7 +129,7 @@ TEST(ConvexParts, OfRandomSolidsAnywhereAtAnyScale) {
   }
 }
 
-TEST(ConvexParts, OfSinglePrecisionSolids) {
+TEST(ConvexParts, CoverSinglePrecisionSolids) {
   constexpr std::uint64_t kSeed = 12;
   Random random(kSeed);
   for (int seed = 0; seed < 200; ++seed) {
@@ -143,7 +143,7 @@ TEST(ConvexParts, OfSinglePrecisionSolids) {
 }
 
 /// As files hold them: turned, so that no face is parallel to an axis, with some decimals.
-TEST(ConvexParts, OfRoundedSolids) {
+TEST(ConvexParts, CoverRoundedSolids) {
   constexpr std::uint64_t kSeed = 23;
   Random random(kSeed);
   for (int i = 0; i < 200; ++i) {
@@ -188,7 +188,7 @@ TEST(ConvexParts, ADentOfAnyDepth) {
   }
 }
 
-TEST(ConvexParts, AConvexMeshIsItsOnlyPartToTheBit) {
+TEST(ConvexParts, ConvexMeshIsExactlyItsOnlyPart) {
   for (const PolygonSoup& soup : {cube(0.06), cone(0.03, 0.06, 32), icosphere(0.03, 2)}) {
     const ConvexMesh plain(soup);
     const std::vector<ConvexMesh> parts = convex_parts(soup);

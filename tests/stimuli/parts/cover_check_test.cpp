@@ -53,7 +53,7 @@ TEST(CoverCheck, HalvesOfACubeCoverIt) {
   EXPECT_EQ(found({cube(0.1)}), "");
 }
 
-TEST(CoverCheck, AGapAndAnOverlapAreFoundByTheVolume) {
+TEST(CoverCheck, VolumeRevealsGapsAndOverlaps) {
   const PolygonSoup left = box_at({-0.025, 0, 0}, {0.05, 0.1, 0.1});
   for (const double shorter : {1e-6, -1e-6}) {
     const std::string fault =
@@ -65,7 +65,7 @@ TEST(CoverCheck, AGapAndAnOverlapAreFoundByTheVolume) {
   EXPECT_EQ(found({left, box_at({0.025, 0, 0}, {0.05, 0.1, 0.1 - 1e-9})}, 1e-8), "");
 }
 
-TEST(CoverCheck, PartsOfTheRightVolumeAtTheWrongPlaceAreFoundByPoints) {
+TEST(CoverCheck, PointsRevealRightVolumesAtTheWrongPlace) {
   // Half of the points are in both parts, half in neither.
   const std::string twice =
       found({box_at({-0.025, 0, 0}, {0.05, 0.1, 0.1}), box_at({-0.025, 0, 0}, {0.05, 0.1, 0.1})});

@@ -132,7 +132,7 @@ LayerPoints compare_cut(const solids::Solid& solid, double depth, int points = 3
   return compare(solid, pointers(cut_into_convex_parts(solid.soup)), depth, points);
 }
 
-TEST(InsetUnion, OfCutSolidsHoldsTheDeeperPoints) {
+TEST(InsetUnion, CutSolidsHoldTheDeeperPoints) {
   for (const double depth : {0.0005, 0.002, 0.005}) {
     const LayerPoints l = compare_cut(solids::l_shape(), depth);
     EXPECT_GT(l.in, 500);
@@ -143,14 +143,14 @@ TEST(InsetUnion, OfCutSolidsHoldsTheDeeperPoints) {
   }
 }
 
-TEST(InsetUnion, OfATorusIsATorus) {
+TEST(InsetUnion, TorusStaysATorus) {
   for (const double depth : {0.001, 0.004}) {
     const LayerPoints counts = compare_cut(solids::torus(0.03, 0.01, 12, 8), depth, 1500);
     EXPECT_GT(counts.in, 100);
   }
 }
 
-TEST(InsetUnion, OfStarsWithSharpNotchesHoldsTheDeeperPoints) {
+TEST(InsetUnion, StarsWithSharpNotchesHoldTheDeeperPoints) {
   constexpr std::uint64_t kSeed = 9;
   Random random(kSeed);
   int made = 0;
@@ -173,7 +173,7 @@ PolygonSoup box(const Vec3& low, const Vec3& high) {
   return soup;
 }
 
-TEST(InsetUnion, PartsThatOverlapOrAbutAreOneSolidInAnyOrder) {
+TEST(InsetUnion, OverlappingOrAbuttingPartsAreOneSolid) {
   const solids::Solid l = solids::l_shape();
   const std::vector<std::vector<PolygonSoup>> ways{
       {box({0, 0, 0}, {0.02, 0.06, 0.03}), box({0.02, 0, 0}, {0.06, 0.02, 0.03})},
@@ -191,7 +191,7 @@ TEST(InsetUnion, PartsThatOverlapOrAbutAreOneSolidInAnyOrder) {
   }
 }
 
-TEST(InsetUnion, OfACutBoxIsThatOfTheWholeBox) {
+TEST(InsetUnion, CutBoxEqualsTheWholeBox) {
   const auto whole = std::make_shared<const ConvexMesh>(box({-0.03, -0.02, 0}, {0.03, 0.02, 0.03}));
   const std::vector<MeshPointer> halves{
       std::make_shared<const ConvexMesh>(box({-0.03, -0.02, 0}, {0.004, 0.02, 0.03})),
@@ -215,7 +215,7 @@ TEST(InsetUnion, SeparatePartsAreInsetSeparately) {
   EXPECT_TRUE(inset_union(apart, 0.0101).empty());
 }
 
-TEST(InsetUnion, ACornerOfThreeConcaveEdgesIsDeepEnoughOrRefused) {
+TEST(InsetUnion, ThreeConcaveEdgesCornerIsDeepOrRefused) {
   // A cube without one of its eight octants.
   const std::vector<PolygonSoup> soups{box({-0.03, -0.03, -0.03}, {0.03, 0.03, 0}),
                                        box({-0.03, -0.03, 0}, {0, 0.03, 0.03}),

@@ -26,7 +26,7 @@ ConvexMesh box_at(const Vec3& low, const Vec3& high, const Quat& turn = Quat(1, 
   return ConvexMesh(soup);
 }
 
-TEST(CommonVolume, OfBoxesThatOverlapAbutAndStandApart) {
+TEST(CommonVolume, IsExactForOverlappingAbuttingAndSeparateBoxes) {
   constexpr std::uint64_t kSeed = 3;
   Random random(kSeed);
   for (int i = 0; i < 20; ++i) {
@@ -48,7 +48,7 @@ TEST(CommonVolume, OfBoxesThatOverlapAbutAndStandApart) {
   }
 }
 
-TEST(CommonVolume, OfSolidsInAnyOrientationIsThatOfSampledPoints) {
+TEST(CommonVolume, SolidsInAnyOrientationMatchSampledPoints) {
   constexpr std::uint64_t kSeed = 4;
   Random random(kSeed);
   for (int i = 0; i < 30; ++i) {
@@ -102,7 +102,7 @@ TEST(GroupOverlaps, NameTheGroupsAndHowMuch) {
   EXPECT_TRUE(overlaps_of_cubes({0, 0.03}).empty());
 }
 
-TEST(GroupOverlaps, OfManyNameTheLargest) {
+TEST(GroupOverlaps, NamesTheLargestOfMany) {
   const std::vector<std::string> said =
       overlaps_of_cubes({0, 0.019, 0.037, 0.054, 0.07, 0.085, 0.104});
   ASSERT_EQ(said.size(), 4U);

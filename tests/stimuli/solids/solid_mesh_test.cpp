@@ -65,7 +65,7 @@ Vec3 half_extent(const SolidMesh& mesh) {
   return far;
 }
 
-TEST(SolidMesh, FillsItsShapeAndIsClosedAtEveryResolution) {
+TEST(SolidMesh, FillsItsShapeClosedAtEveryResolution) {
   const double pi = std::numbers::pi;
   struct Case {
     ShapeKind shape;
@@ -105,7 +105,7 @@ TEST(SolidMesh, FillsItsShapeAndIsClosedAtEveryResolution) {
   }
 }
 
-TEST(SolidMesh, HasElementsInProportionToASidesLengthAndAtLeastTwo) {
+TEST(SolidMesh, ElementsFollowSideLengthsWithAtLeastTwo) {
   EXPECT_EQ(mesh_of_primitive(solid_spec(ShapeKind::box), 8).hexahedra.size(), 8U * 4U * 2U);
   EXPECT_EQ(mesh_of_primitive(solid_spec(ShapeKind::box), 4).hexahedra.size(), 4U * 2U * 2U);
   EXPECT_EQ(mesh_of_primitive(solid_spec(ShapeKind::cube), 3).hexahedra.size(), 27U);
@@ -113,7 +113,7 @@ TEST(SolidMesh, HasElementsInProportionToASidesLengthAndAtLeastTwo) {
   EXPECT_EQ(surface_of(mesh_of_primitive(solid_spec(ShapeKind::cube), 3)).size(), 6U * 9U * 2U);
 }
 
-TEST(SolidMesh, NodesAreSharedByNeighboursSoEveryInnerFaceHasTwoElements) {
+TEST(SolidMesh, NeighboursShareNodesAndEveryInnerFace) {
   const SolidMesh mesh = mesh_of_primitive(solid_spec(ShapeKind::sphere), 6);
   std::set<std::array<double, 3>> places;
   for (const Vec3& p : mesh.nodes) {
@@ -122,7 +122,7 @@ TEST(SolidMesh, NodesAreSharedByNeighboursSoEveryInnerFaceHasTwoElements) {
   }
 }
 
-TEST(SolidMesh, TheSurfaceOfATetrahedronIsClosedWithFourTrianglesAFace) {
+TEST(SolidMesh, TetrahedronIsClosedWithFourTrianglesAFace) {
   SolidMesh mesh;
   mesh.nodes = {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {0, 0, 2}, {1, 0, 0},
                 {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
