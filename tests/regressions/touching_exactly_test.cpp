@@ -13,7 +13,7 @@
 namespace palpate {
 namespace {
 
-TEST(TouchingExactly, IsNoContactYetAndTheNextTickIsTheTop) {
+TEST(TouchingExactly, IsNoContactAndNextTickIsTop) {
   const auto mesh = std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.06));
   for (const rendering::Renderer* renderer :
        {&rendering::point_renderer(), &rendering::ray_renderer()}) {

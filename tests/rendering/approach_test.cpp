@@ -85,21 +85,21 @@ Counts check_motions(bool segment, double way, double turn, std::uint64_t stream
   return counts;
 }
 
-TEST(Approach, OfATipEndsAsLookingEverywhereDoes) {
+TEST(Approach, TipEndsAsLookingEverywhereDoes) {
   const Counts counts = check_motions(false, 0.5, 0, 1);
   EXPECT_GT(counts.entered, 300);
   EXPECT_GT(counts.separated, 300);
   EXPECT_EQ(counts.undecided, 0);
 }
 
-TEST(Approach, OfAStylusThatTurnsLittleEndsAsLookingEverywhereDoes) {
+TEST(Approach, SlowlyTurningStylusEndsAsLookingEverywhereDoes) {
   const Counts counts = check_motions(true, 0.3, 0.05, 2);
   EXPECT_GT(counts.entered, 300);
   EXPECT_GT(counts.separated, 300);
   EXPECT_LE(counts.undecided, (counts.entered + counts.separated) / 100);
 }
 
-TEST(Approach, OfAStylusThatIsWhirledEndsAsLookingEverywhereDoes) {
+TEST(Approach, WhirledStylusEndsAsLookingEverywhereDoes) {
   const Counts counts = check_motions(true, 1, 2, 3);
   EXPECT_GT(counts.entered, 300);
   EXPECT_GT(counts.separated, 300);

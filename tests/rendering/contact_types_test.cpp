@@ -87,7 +87,7 @@ TEST(ContactTypes, SideAcrossAnEdge) {
   expect_vector(r.device2, 0.3 * r.force, 1e-13);
 }
 
-TEST(ContactTypes, AProbeOfZeroLengthIsAPointAndLoadsDeviceOne) {
+TEST(ContactTypes, ZeroLengthProbeIsPointLoadingDeviceOne) {
   Bench bench = cube_bench(ray_renderer());
   const Vec3 p(0.001, 0.002, kHalfEdge - kDepth);
   const Rendering r = lowered(bench, {p, p});
@@ -140,7 +140,7 @@ TEST(SegmentFace, ContactFollowsEquationTwo) {
   }
 }
 
-TEST(SegmentFace, FlatStickIsHeldInTheMiddleOfWhatTouches) {
+TEST(SegmentFace, FlatStickIsHeldMidwayAlongWhatTouches) {
   Bench bench = cube_bench(ray_renderer());
   const LineProbe probe = testing::moved(tilted({-0.01, 0.12}, 0), {0, 0, -kDepth});
   const Rendering r = lowered(bench, probe);
@@ -149,7 +149,7 @@ TEST(SegmentFace, FlatStickIsHeldInTheMiddleOfWhatTouches) {
   expect_vector(r.deepest.point, {(-0.01 + kHalfEdge) / 2, 0.004, kHalfEdge}, 1e-15);
 }
 
-TEST(SegmentFace, OutsideTheBlendTheTypesAreThoseOfTheCorners) {
+TEST(SegmentFace, HasTheCornersTypesOutsideTheBlend) {
   for (const double sign : {1.0, -1.0}) {
     const double theta = sign * 1.001 * kBlendAngle;
     {

@@ -109,7 +109,7 @@ void slide_and_bound(const Renderer& renderer,
 
 class Continuity : public ::testing::TestWithParam<const Renderer*> {};
 
-TEST_P(Continuity, OfForceOverFacets) {
+TEST_P(Continuity, ForceIsContinuousOverFacets) {
   Seen seen;
   for (std::uint64_t seed = 0; seed < 60 && !HasFatalFailure(); ++seed) {
     Random random(seed, {81});

@@ -67,7 +67,7 @@ TEST(EquivalentPoint, MovesWithoutJumpsOverAShallowRidge) {
   }
 }
 
-TEST(EquivalentPoint, ARidgeWithoutAnAngleIsAFlatFace) {
+TEST(EquivalentPoint, RidgeWithoutAngleIsAFlatFace) {
   const Scene flat({testing::placed_object(testing::box({-0.03, -0.02, -0.03}, {0.03, 0.02, 0}))});
   std::vector<double> on_flat;
   const double most = 0.9 * kBlendAngle;
@@ -79,7 +79,7 @@ TEST(EquivalentPoint, ARidgeWithoutAnAngleIsAFlatFace) {
   });
 }
 
-TEST(EquivalentPoint, AFaceFarFromTheRidgeHasEquationTwoAlone) {
+TEST(EquivalentPoint, FarFromTheRidgeEquationTwoHoldsAlone) {
   // Half of the stylus is over one face, and the other is beyond its end.
   const double angle = 1.5 * std::numbers::pi / 180;
   const Scene scene = ridge(angle);
@@ -99,7 +99,7 @@ TEST(EquivalentPoint, AFaceFarFromTheRidgeHasEquationTwoAlone) {
   }
 }
 
-TEST(EquivalentPoint, ACutSlabHasThePointOfTheWhole) {
+TEST(EquivalentPoint, CutSlabHasThePointOfTheWhole) {
   const Scene whole(
       testing::object_of({testing::box_soup({-0.05, -0.05, -0.04}, {0.05, 0.05, 0})}));
   const Scene cut(testing::object_of({testing::box_soup({-0.05, -0.05, -0.04}, {-0.01, 0.05, 0}),

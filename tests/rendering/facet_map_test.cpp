@@ -71,7 +71,7 @@ int steps_between(const stimuli::ConvexMesh& mesh, std::uint32_t from, std::uint
   return most + 1;
 }
 
-TEST(FacetMap, IsAsNearToWhereARayLeavesOnAnyShapeAndFineness) {
+TEST(FacetMap, IsNearTheRaysExitOnAnyShape) {
   constexpr int kNear = 12;  // facets
   for (const Vec3& by : kStretches) {
     for (const int subdivisions : {3, 5}) {
@@ -94,7 +94,7 @@ TEST(FacetMap, IsAsNearToWhereARayLeavesOnAnyShapeAndFineness) {
   }
 }
 
-TEST(FacetMap, IsUnderThePointOfASegmentThatIsNearest) {
+TEST(FacetMap, LiesUnderTheSegmentsNearestPoint) {
   const Mesh mesh = stretched_ball(Vec3(1), 5);
   const FacetMap map(*mesh, 0);
   constexpr std::uint64_t kSeed = 8;
@@ -125,7 +125,7 @@ TEST(FacetMap, SmallMeshesHaveNone) {
   EXPECT_NE(large.facet_map(), nullptr);
 }
 
-TEST(SupportMap, AClimbFromItEndsOnTheExtremeVertex) {
+TEST(SupportMap, ClimbsFromItEndOnTheExtremeVertex) {
   std::vector<Mesh> meshes;
   for (const Vec3& by : kStretches) meshes.push_back(stretched_ball(by, 4));
   meshes.push_back(std::make_shared<const stimuli::ConvexMesh>(
@@ -149,7 +149,7 @@ TEST(SupportMap, AClimbFromItEndsOnTheExtremeVertex) {
   }
 }
 
-TEST(PairCast, LocatedWithoutAStartIsInsideWhereNoPlaneSeparates) {
+TEST(PairCast, WithoutStartIsInsideUnlessAPlaneSeparates) {
   int inside = 0, outside = 0;
   for (const Vec3& by : kStretches) {
     const Mesh mesh = stretched_ball(by, 5);
@@ -218,7 +218,7 @@ class WithAndWithoutMaps {
 
 class Maps : public ::testing::TestWithParam<const Renderer*> {};
 
-TEST_P(Maps, ChangeNoBitOfAFirstContactOnALargeMesh) {
+TEST_P(Maps, ChangeNoBitOfLargeMeshFirstContacts) {
   int contacts = 0;
   for (const Vec3& by : kStretches) {
     WithAndWithoutMaps both(*GetParam(), stretched_ball(by, 5));

@@ -19,7 +19,7 @@ std::shared_ptr<const stimuli::ConvexMesh> shared(const stimuli::PolygonSoup& so
 
 class FirstContact : public ::testing::TestWithParam<const Renderer*> {};
 
-TEST_P(FirstContact, FasterThanAPlateIsThickHoldsOnTheSideOfEntry) {
+TEST_P(FirstContact, FastProbesStayOnThePlatesEntrySide) {
   const double thickness = 1e-4;
   for (const double side : {1.0, -1.0}) {
     Bench bench(*GetParam(), shared(testing::plate(0.1, thickness)));
@@ -69,7 +69,7 @@ TEST_P(FirstContact, APlateIsNotCrossedOnAnyPath) {
   }
 }
 
-TEST(FirstContactOfTheSide, AFastStylusDoesNotPassThroughANeedle) {
+TEST(FirstContactOfTheSide, FastStylusDoesNotPassThroughANeedle) {
   for (std::uint64_t seed = 0; seed < 3000; ++seed) {
     Random random(seed, {12});
     const double size = 2e-4 * std::pow(1e5, random.unit());
@@ -161,7 +161,7 @@ TEST_P(FirstContact, AgreesWithTheMotionInAHundredSteps) {
   EXPECT_GT(tally.held_by_face, 100);
 }
 
-TEST_P(FirstContact, ByTheNearestSideIsAsDeepAsTheReference) {
+TEST_P(FirstContact, NearestSideIsAsDeepAsTheReference) {
   int plunges = 0;
   for (std::uint64_t seed = 0; seed < 250; ++seed) {
     Random random(seed, {14});

@@ -76,7 +76,7 @@ class Hand {
   Vec3 tip_;
 };
 
-TEST(FrictionMemory, ATipThatComesDownAgainIsPushedStraightUp) {
+TEST(FrictionMemory, TipComingDownAgainIsPushedStraightUp) {
   for (const Place& place : places()) {
     for (const Tool& tool : tools()) {
       for (const Renderer* renderer : {&point_renderer(), &ray_renderer()}) {

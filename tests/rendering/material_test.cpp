@@ -56,7 +56,7 @@ stimuli::Material frictional(double fixed, double dynamic) {
   return material;
 }
 
-TEST(Material, DampingPushesBackOnTheWayInAndNeverPulls) {
+TEST(Material, DampingResistsTheWayInAndNeverPulls) {
   stimuli::Material material;
   material.damping = 2;
   Block block(material);
@@ -67,7 +67,7 @@ TEST(Material, DampingPushesBackOnTheWayInAndNeverPulls) {
   EXPECT_EQ(block.tick(0.0004).force.z, 0);  // 0.8 m/s out: 0.32 N of spring, 1.6 N of damping
 }
 
-TEST(Friction, SticksBelowTheStaticAndSlidesAtTheDynamicCoefficient) {
+TEST(Friction, SticksBelowStaticAndSlidesAtDynamicCoefficient) {
   Block block(frictional(0.5, 0.3));
   const double depth = 0.002, normal = 800 * depth;
   block.tick(depth);
@@ -114,7 +114,7 @@ TEST(Friction, EndsWithTheContact) {
   EXPECT_EQ(block.tick(0.002, 0.0005).force.x, 0);
 }
 
-TEST(Friction, OfTheSideOfTheStylusTurnsIt) {
+TEST(Friction, SideFrictionTurnsTheStylus) {
   Scene scene({Block::object(frictional(0.5, 0.5))});
   RenderState state = scene.initial_state();
   const auto held = [](double depth, double y) {
@@ -135,7 +135,7 @@ TEST(Friction, OfTheSideOfTheStylusTurnsIt) {
   EXPECT_NEAR(r.device2.y, 0.25 * r.force.y, 1e-9);
 }
 
-TEST(Friction, NeverGivesEnergyOverClosedPathsOnAFace) {
+TEST(Friction, NeverGivesEnergyOnClosedPathsOnFaces) {
   constexpr std::uint64_t kSeed = 11;
   Random random(kSeed);
   const auto between = [&](double low, double high) { return low + (high - low) * random.unit(); };

@@ -74,7 +74,7 @@ double gap(const ScenePart& part, const LineProbe& probe) {
   return glm::length(to - t * d) - part.sphere_radius;
 }
 
-TEST(NearParts, ListWhatTheProbeMayMeetWhereverItLeaps) {
+TEST(NearParts, ListWhatALeapingProbeMayMeet) {
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
     const Scene scene = crowd(seed, 300, 0.3, {}, seed % 2 == 0);
     ASSERT_GT(scene.parts().size(), Scene::kFewParts);

@@ -147,7 +147,7 @@ class RandomScene : public ::testing::Test {
   }
 };
 
-TEST_F(RandomScene, NoIdealToolIsInsideAndForcesAreInBalance) {
+TEST_F(RandomScene, IdealToolStaysOutsideAndForcesBalance) {
   for (std::uint64_t seed = 0; seed < 120; ++seed) {
     const DrawnScene drawn = random_scene(seed);
     follow(drawn, seed % 5 == 0 ? point_renderer() : ray_renderer());

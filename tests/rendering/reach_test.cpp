@@ -64,7 +64,7 @@ LineProbe virtual_motion(Reach reach, const LineProbe& motion) {
   return stretched(reach, motion);
 }
 
-TEST(Reach, ForcesDoTheSameWorkForEveryMotionOfTheEnds) {
+TEST(Reach, ForcesDoEqualWorkHoweverTheEndsMove) {
   constexpr std::uint64_t kSeed = 6;
   Random random(kSeed);
   for (int i = 0; i < 20000; ++i) {
@@ -85,7 +85,7 @@ TEST(Reach, ForcesDoTheSameWorkForEveryMotionOfTheEnds) {
 
 // A cube far from the hand, pressed by the side of a virtual stylus of 0.6 m; the real one has 0.12
 // m.
-TEST(Reach, AContactsForceDoesTheSameWorkAtItsPlaceAndAtTheHand) {
+TEST(Reach, ContactForceDoesEqualWorkAtTheHand) {
   std::vector<SceneObject> objects(1);
   objects[0].mesh = std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.05));
   const Scene scene(std::move(objects));

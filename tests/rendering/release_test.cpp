@@ -80,7 +80,7 @@ TEST_P(Layers, LayerDampingActsInsideTheLayer) {
   EXPECT_NEAR(in, 100 * 0.0021 + 500 * 0.0011 + 4 * 0.1, 1e-9);
 }
 
-TEST_P(Layers, ABrokenLayerFadesAndComesBackWhenTheObjectHasBeenLeft) {
+TEST_P(Layers, BrokenLayerFadesAndReturnsOnceLeft) {
   constexpr double kBreaks = 1;  // N: 2 mm into the layer
   const Scene scene(layered_cube(100, {{0.001, 500, 0, kBreaks}}, GetParam()));
   RenderState state = scene.initial_state();
@@ -155,7 +155,7 @@ std::vector<SceneObject> corner(bool has_layer) {
   return parts;
 }
 
-TEST(PartsOfALayer, ABrokenOneDoesNotMoveTheIdealToolOfTheSurface) {
+TEST(PartsOfALayer, BrokenOneDoesNotMoveSurfacesIdealTool) {
   const Scene surface(corner(false)), layered(corner(true));
   RenderState alone = surface.initial_state(), beside = layered.initial_state();
   const auto difference = [&](const Vec3& tip, const Vec3& d) {
@@ -174,7 +174,7 @@ TEST(PartsOfALayer, ABrokenOneDoesNotMoveTheIdealToolOfTheSurface) {
 }
 
 /// A slab that breaks at 1 N on a block that does not break, both of one layer.
-TEST(PartsOfALayer, APartUnderABrokenOneTakesOverSmoothly) {
+TEST(PartsOfALayer, PartUnderBrokenOneTakesOverSmoothly) {
   constexpr double kTop = 0.03, kSeam = 0.026, kSpring = 500;  // m, m, N/m
   std::vector<SceneObject> parts{
       testing::placed_object(testing::mesh_of(box_soup(Vec3(-kTop), Vec3(kTop))), {}, 0, 0),
@@ -211,7 +211,7 @@ TEST(PartsOfALayer, APartUnderABrokenOneTakesOverSmoothly) {
   }
 }
 
-TEST_P(Layers, StartingBetweenSurfaceAndLayerGivesNoForceUntilItHasLeft) {
+TEST_P(Layers, StartBetweenSurfaceAndLayerGivesNoForce) {
   const Scene scene(layered_cube(100, {{0.005, 500, 0, {}}}, GetParam()));
   RenderState state = scene.initial_state();
   for (const double depth : {0.002, 0.006, 0.008, 0.001}) {

@@ -221,7 +221,7 @@ TEST_P(SeveralParts, ASurfaceTouchedExactlyIsFeltOncePushed) {
   }
 }
 
-TEST_P(SeveralParts, HundredsOfObjectsAreFeltAtOnceWithoutAllocation) {
+TEST_P(SeveralParts, HundredsAreFeltAtOnceWithoutAllocation) {
   constexpr int kObjects = 300;
   constexpr double kPressed = 1e-3, kSoft = 2;  // m, N/m
   std::vector<SceneObject> objects;
@@ -311,7 +311,7 @@ TEST(SeveralPartsOfTheSide, StickAcrossASeamFeelsOneForce) {
 
 /// Scattered small boxes: a stylus comes down on one of them with its side, at any distance from
 /// its tip and with any motion. The force is that of this box alone.
-TEST(SeveralPartsOnTheSide, EachIsFoundWhereverOnTheStylusItIs) {
+TEST(SeveralPartsOnTheSide, EachIsFoundAnywhereOnTheStylus) {
   const auto at = [](double x, int object) {
     return placed_object(box({x - 0.004, -0.004, -0.008}, {x + 0.004, 0.004, 0}), {}, kSpring,
                          object);

@@ -248,7 +248,7 @@ TEST_P(SurfaceContact, TheIdealToolIsNeverInside) {
   }
 }
 
-TEST_P(SurfaceContact, AConvexMeshGivesTheForcesOfTheWalk) {
+TEST_P(SurfaceContact, ConvexMeshGivesTheForcesOfTheWalk) {
   constexpr std::uint64_t kSeed = 5;
   Random random(kSeed);
   const stimuli::PolygonSoup soup = stimuli::icosphere(0.03, 2);
@@ -268,7 +268,7 @@ TEST_P(SurfaceContact, AConvexMeshGivesTheForcesOfTheWalk) {
   }
 }
 
-TEST_P(SurfaceContact, BendsOfAnyAngleAreCrossedWithoutAStepOrAStop) {
+TEST_P(SurfaceContact, CrossesAnyBendWithoutAStepOrStop) {
   for (const double bend : {1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.5}) {
     for (const double angle : {bend, -bend}) {
       const Scene scene = scene_of({bent_block(angle)});
@@ -302,7 +302,7 @@ TEST_P(SurfaceContact, BendsOfAnyAngleAreCrossedWithoutAStepOrAStop) {
   }
 }
 
-TEST_P(SurfaceContact, SidesThatRoundingBentBackDoNotTakeTurnsForEver) {
+TEST_P(SurfaceContact, SidesBentByRoundingDoNotAlternateForever) {
   // Two halves of a face that bend up by 8e-8 rad, pressed 50 mm deep: within its skin the tool
   // does not see the bottom of that valley.
   const Scene scene = scene_of({bent_block(8e-8)});
@@ -396,7 +396,7 @@ TEST_P(SurfaceContact, TrianglesWithoutAreaLeaveNoGap) {
   }
 }
 
-TEST_P(SurfaceContact, ARidgeWithASliverFoldedOverItHoldsAStylus) {
+TEST_P(SurfaceContact, RidgeUnderAFoldedSliverHoldsAStylus) {
   // As rounding does it, within the tolerance of winding numbers.
   if (!GetParam()->side_contact()) return;
   const Vec3 ridge(0.05, 0.003, 0.05), out = glm::normalize(Vec3(1, 0, 1)),
@@ -418,7 +418,7 @@ TEST_P(SurfaceContact, ARidgeWithASliverFoldedOverItHoldsAStylus) {
   }
 }
 
-TEST_P(SurfaceContact, AStylusThatGrowsIntoAFaceTouchesIt) {
+TEST_P(SurfaceContact, StylusGrowingIntoAFaceTouchesIt) {
   // Two devices hold the ends, so the stylus has no fixed length.
   if (!GetParam()->side_contact()) return;
   const Scene scene = scene_of({bent_block(0.1)});
@@ -432,7 +432,7 @@ TEST_P(SurfaceContact, AStylusThatGrowsIntoAFaceTouchesIt) {
   EXPECT_NEAR(glm::length(r.force - kStiffness * Vec3(0, 0, 1.4e-4)), 0, 1e-9);
 }
 
-TEST_P(SurfaceContact, AToolRestsAtTheBottomOfAFlatValley) {
+TEST_P(SurfaceContact, ToolRestsAtTheFlatValleysBottom) {
   // Faces of files with rounded coordinates bend by 1e-7 to 1e-3 rad. A tip that is pressed
   // between their normals may not see the bottom within its skin.
   constexpr std::uint64_t kSeed = 5;
@@ -465,7 +465,7 @@ TEST_P(SurfaceContact, AToolRestsAtTheBottomOfAFlatValley) {
   }
 }
 
-TEST_P(SurfaceContact, AToolRestsWhereTheFacesOfTwoShellsCross) {
+TEST_P(SurfaceContact, ToolRestsWhereTwoShellsFacesCross) {
   // As a rounded file leaves them where shells overlap: the valley has no edge.
   for (double bend = 1e-8; bend < 1e-4; bend *= 1.5) {
     const double rise = 0.04 * std::tan(bend), c = std::cos(bend), s = std::sin(bend);
@@ -490,7 +490,7 @@ TEST_P(SurfaceContact, AToolRestsWhereTheFacesOfTwoShellsCross) {
   }
 }
 
-TEST_P(SurfaceContact, ACrackThatRoundingOpensBetweenShellsLetsNothingIn) {
+TEST_P(SurfaceContact, CrackByRoundingBetweenShellsAdmitsNothing) {
   // A block on a plate, as an assembly is written with single precision.
   constexpr double kError = 4e-9;
   for (double gap : {-kError, 0.0, 0.1 * kError, 0.5 * kError, kError, 2 * kError}) {
@@ -517,7 +517,7 @@ Vec3 rounded(const Vec3& corner, double decimals) {
   return out;
 }
 
-TEST_P(SurfaceContact, AStepThatRoundingMakesBetweenShellsHoldsNothing) {
+TEST_P(SurfaceContact, StepByRoundingBetweenShellsHoldsNothing) {
   // Two blocks of different sizes with their upper faces in one plane, turned.
   constexpr std::uint64_t kSeed = 11;
   Random random(kSeed);
@@ -559,7 +559,7 @@ TEST_P(SurfaceContact, AStepThatRoundingMakesBetweenShellsHoldsNothing) {
   }
 }
 
-TEST(SurfaceSeam, IsAsWideAsTheGapBetweenTwoShellsWithinTheirError) {
+TEST(SurfaceSeam, IsAsWideAsTheGapWithinError) {
   constexpr double kError = 1e-7;
   const auto seam = [&](const Vec3& low, double error) {
     stimuli::PolygonSoup plate = box_soup({-0.05, -0.05, -0.02}, {0.05, 0.05, 0}),
@@ -577,7 +577,7 @@ TEST(SurfaceSeam, IsAsWideAsTheGapBetweenTwoShellsWithinTheirError) {
   EXPECT_EQ(seam({0, -0.02, kError}, 0), 0) << "coordinates that are not rounded";
 }
 
-TEST(SurfaceStylus, OneThatGrowsFromItsTipDoesNotEnter) {
+TEST(SurfaceStylus, DoesNotEnterWhileGrowingFromItsTip) {
   const Scene scene = scene_of({box_soup({-0.05, -0.05, -0.02}, {0.05, 0.05, 0})});
   RenderState state = scene.initial_state();
   const Vec3 tip(0.001, 0.002, 0.001);
@@ -589,7 +589,7 @@ TEST(SurfaceStylus, OneThatGrowsFromItsTipDoesNotEnter) {
 
 /// Rounding decides with which end such a stylus touches each of the face's triangles, and whether
 /// their edges are convex.
-TEST(SurfaceStylus, OneThatLiesOnAFaceIsHeldWhileItSlides) {
+TEST(SurfaceStylus, IsHeldWhileSlidingFlatOnAFace) {
   constexpr std::uint64_t kSeed = 1;
   Random random(kSeed);
   for (int round = 0; round < 40000; ++round) {
@@ -610,7 +610,7 @@ TEST(SurfaceStylus, OneThatLiesOnAFaceIsHeldWhileItSlides) {
   }
 }
 
-TEST_P(SurfaceContact, AFlatFaceInManyTrianglesHoldsNothingAlongIt) {
+TEST_P(SurfaceContact, FlatFacesTrianglesHoldNothingAlongIt) {
   constexpr std::uint64_t kSeed = 3;
   Random random(kSeed);
   for (int round = 0; round < 4; ++round) {
@@ -678,7 +678,7 @@ TEST_P(SurfaceContact, OverlappingShellsAreTheirUnion) {
   EXPECT_NEAR(glm::length(r.force - Vec3(-2, 0, 1)), 0, 1e-9);
 }
 
-TEST_P(SurfaceContact, WhoStartsInsideFeelsNothingUntilItHasLeft) {
+TEST_P(SurfaceContact, StartInsideFeelsNothingUntilItLeaves) {
   const Scene scene = scene_of({bent_block(0.3)});
   RenderState state = scene.initial_state();
   Rendering r = tick(scene, state, standing({-0.02, 0, -0.01}));
@@ -710,7 +710,7 @@ stimuli::PolygonSoup wavy_ball(int subdivisions) {
 }
 
 /// A hand whose stylus turns by degrees from tick to tick, over triangles of half a millimetre.
-TEST_P(SurfaceContact, AFineMeshIsNotEnteredByAStylusThatTurnsFast) {
+TEST_P(SurfaceContact, FastTurningStylusDoesNotEnterFineMeshes) {
   const SceneSurface placed = surface_of({wavy_ball(5)});
   const Surface& surface = *placed.surface;
   const Scene scene({}, true, {}, nullptr, {placed});
@@ -744,7 +744,7 @@ TEST_P(SurfaceContact, AFineMeshIsNotEnteredByAStylusThatTurnsFast) {
 
 /// A stylus with a foot that lies on a plate: which of the two holds the tool at their joint
 /// depends on their order and on the way there, the torque on the pose alone.
-TEST(SurfaceTool, TheTorqueAtAJointIsThatOfThePose) {
+TEST(SurfaceTool, JointTorqueDependsOnThePoseAlone) {
   const ToolSegment stylus{Vec3(0), Vec3(0, 0, 0.08)}, foot{Vec3(0), Vec3(0.03, 0, 0)},
       back{Vec3(0.03, 0, 0), Vec3(0)};
   const stimuli::PolygonSoup plate = stimuli::box(Vec3(0.1, 0.1, 0.02));
@@ -774,7 +774,7 @@ TEST(SurfaceTool, TheTorqueAtAJointIsThatOfThePose) {
 }
 
 /// A part out of reach makes the tick a general one.
-TEST_P(SurfaceContact, ASurfaceAloneGivesTheBitsOfAnyScene) {
+TEST_P(SurfaceContact, LoneSurfaceGivesTheBitsOfAnyScene) {
   constexpr std::uint64_t kSeed = 23;
   Random random(kSeed);
   const SceneSurface placed = surface_of({torus(14, 8, 0.03, 0.01)});
@@ -895,7 +895,7 @@ TEST(SurfaceTree, FindsAllThatAMovingSegmentCanTouch) {
   EXPECT_GT(sides, 1000);
 }
 
-TEST(SurfaceTool, ASingleMeshGivesTheForcesOfItsParts) {
+TEST(SurfaceTool, SingleMeshGivesTheForcesOfItsParts) {
   // A step of two boxes, under a bent tool of two segments.
   const stimuli::PolygonSoup whole =
       prism({{-0.05, -0.02}, {0.05, -0.02}, {0.05, 0.01}, {0, 0.01}, {0, 0}, {-0.05, 0}}, 0.05);

@@ -508,9 +508,9 @@ void aim_at_edges(bool sides) {
   EXPECT_GT(tried, 30000);
 }
 
-TEST(SurfaceAim, APointThatPassesExactlyOverAnEdgeIsStopped) { aim_at_edges(false); }
+TEST(SurfaceAim, PointPassingExactlyOverAnEdgeIsStopped) { aim_at_edges(false); }
 
-TEST(SurfaceAim, AStylusThatPassesExactlyOverAnEdgeIsStopped) { aim_at_edges(true); }
+TEST(SurfaceAim, StylusPassingExactlyOverAnEdgeIsStopped) { aim_at_edges(true); }
 
 TEST_P(SurfaceOutside, APointStaysOutside) { touch_meshes({{Vec3(0), Vec3(0)}}); }
 

@@ -114,7 +114,7 @@ TEST_P(Tick, FreeSpaceIsFree) {
   }
 }
 
-TEST_P(Tick, StartingInsideGivesNoForceUntilItHasBeenLeft) {
+TEST_P(Tick, StartingInsideGivesNoForceUntilLeft) {
   Bench bench(*GetParam(), small_cube());
   const LineProbe inside{{0.002, 0.003, kHalf - 0.004}, {0.01, 0.02, 0.1}};
   const LineProbe outside = testing::moved(inside, {0, 0, 0.01});
@@ -150,7 +150,7 @@ TEST_P(Tick, StartingInsideOneObjectLeavesTheOtherAlone) {
   EXPECT_EQ(second.faults, 0u);
 }
 
-TEST_P(Tick, BadPosesGiveNoForceAndTheNextGoodOneRecovers) {
+TEST_P(Tick, BadPosesGiveNoForceGoodOnesRecover) {
   const double bad[] = {std::numeric_limits<double>::quiet_NaN(),
                         std::numeric_limits<double>::infinity(),
                         -std::numeric_limits<double>::infinity()};
@@ -180,7 +180,7 @@ TEST_P(Tick, BadPosesGiveNoForceAndTheNextGoodOneRecovers) {
   }
 }
 
-TEST_P(Tick, AFirstBadPoseIsNotAStartInside) {
+TEST_P(Tick, FirstBadPoseIsNoStartInside) {
   Bench bench(*GetParam(), small_cube());
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const LineProbe above{{0.002, 0.003, kHalf + 0.01}, {0.01, 0.02, 0.1}};
@@ -190,7 +190,7 @@ TEST_P(Tick, AFirstBadPoseIsNotAStartInside) {
   EXPECT_EQ(bench.tick(testing::moved(above, {0, 0, -0.011})).contacts, 1);
 }
 
-TEST_P(Tick, HugeAndTinyPosesStayFiniteAndAreForgotten) {
+TEST_P(Tick, ExtremePosesStayFiniteAndAreForgotten) {
   const double values[] = {0, 1e-320, 1e-160, 1e-5, 1e5, 1e100, 1e160, 1e308, -1e308};
   const LineProbe above{{0.002, 0.003, kHalf + 0.01}, {0.003, 0.004, kHalf + 0.02}};
   for (std::uint64_t seed = 0; seed < 2000; ++seed) {

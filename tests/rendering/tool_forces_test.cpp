@@ -16,7 +16,7 @@ using testing::cluster_path;
 using testing::kTick;
 using testing::random_tool;
 
-TEST(ToolForces, AreSplitOnTwoDevicesAndTurnTheHand) {
+TEST(ToolForces, SplitOnTwoDevicesAndTurnTheHand) {
   constexpr std::uint64_t kSeed = 11;
   Random random(kSeed);
   int off_axis = 0;
@@ -56,7 +56,7 @@ TEST(ToolForces, AreSplitOnTwoDevicesAndTurnTheHand) {
 }
 
 // A joint of a tool may meet more parts at once than planes can hold it.
-TEST(ToolForces, AToolThatTurnsOntoManyFacesInOnePlaneMovesOn) {
+TEST(ToolForces, ToolTurningOntoManyCoplanarFacesMovesOn) {
   constexpr std::uint64_t kSeed = 13;
   Random random(kSeed);
   std::vector<SceneObject> parts;
@@ -92,7 +92,7 @@ TEST(ToolForces, AToolThatTurnsOntoManyFacesInOnePlaneMovesOn) {
 }
 
 // One segment from tip to tail is the plain stylus, and so are its pieces.
-TEST(ToolForces, AToolThatIsTheStylusFeelsAsTheStylus) {
+TEST(ToolForces, ToolEqualToTheStylusFeelsTheSame) {
   constexpr std::uint64_t kSeed = 12;
   Random random(kSeed);
   int in_contact = 0, same = 0;

@@ -42,7 +42,7 @@ double deepest_inside(const Scene& scene, const RenderState& state, bool sides) 
   return deepest;
 }
 
-TEST_P(UnionCluster, TheIdealToolIsNeverInsideOfAPart) {
+TEST_P(UnionCluster, IdealToolIsNeverInsideAPart) {
   const bool sides = GetParam()->side_contact();
   std::size_t ticks = 0, in_contact = 0, lagging = 0;
   for (std::uint64_t seed = 0; seed < 160; ++seed) {
@@ -64,7 +64,7 @@ TEST_P(UnionCluster, TheIdealToolIsNeverInsideOfAPart) {
   EXPECT_LE(lagging, in_contact / 100);
 }
 
-TEST_P(UnionCluster, ThePartsOrderPlaceAndSizeDoNotMatter) {
+TEST_P(UnionCluster, PartsOrderPlaceAndSizeDoNotMatter) {
   const bool sides = GetParam()->side_contact();
   std::size_t ticks = 0, same_order = 0, same_place = 0, same_size = 0;
   for (std::uint64_t seed = 0; seed < 24; ++seed) {
@@ -104,7 +104,7 @@ TEST_P(UnionCluster, ThePartsOrderPlaceAndSizeDoNotMatter) {
   EXPECT_GE(same_size, ticks - ticks / 100);
 }
 
-TEST_P(UnionCluster, AFastToolIsStoppedByAThinPlate) {
+TEST_P(UnionCluster, ThinPlateStopsAFastTool) {
   const bool sides = GetParam()->side_contact();
   constexpr std::uint64_t kSeed = 7;
   Random random(kSeed);
@@ -134,7 +134,7 @@ TEST_P(UnionCluster, AFastToolIsStoppedByAThinPlate) {
   }
 }
 
-TEST_P(UnionCluster, NothingIsAllocatedAndNoNaNGetsThrough) {
+TEST_P(UnionCluster, AllocatesNothingAndLetsNoNaNThrough) {
   const bool sides = GetParam()->side_contact();
   constexpr std::uint64_t kSeed = 8;
   Random random(kSeed);

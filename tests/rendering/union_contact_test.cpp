@@ -59,7 +59,7 @@ std::vector<stimuli::PolygonSoup> valley() {
   return out;
 }
 
-TEST_P(UnionContact, AValleyOverASeamHoldsTheTipFromBothSides) {
+TEST_P(UnionContact, ValleyOverSeamHoldsTipFromBothSides) {
   constexpr std::uint64_t kSeed = 3;
   Random random(kSeed);
   for (int i = 0; i < 50; ++i) {
@@ -76,7 +76,7 @@ TEST_P(UnionContact, AValleyOverASeamHoldsTheTipFromBothSides) {
   }
 }
 
-TEST_P(UnionContact, GroovesOfAnyOpeningHoldTheTipInTheirApex) {
+TEST_P(UnionContact, AnyGrooveHoldsTheTipInItsApex) {
   for (int degrees = 2; degrees <= 178; degrees += 2) {
     const Scene scene(object_of(testing::groove(degrees * std::numbers::pi / 180), {}, kStiffness));
     RenderState state = scene.initial_state();
@@ -97,7 +97,7 @@ TEST_P(UnionContact, GroovesOfAnyOpeningHoldTheTipInTheirApex) {
   }
 }
 
-TEST_P(UnionContact, AStickInThePlaneOfAWallIsHeldByTheFloorAlone) {
+TEST_P(UnionContact, FloorAloneHoldsSticksInAWallsPlane) {
   const Scene scene(object_of(
       {box_soup({-0.06, -0.1, -0.03}, {0.03, 0.1, 0}), box_soup({0, -0.1, 0}, {0.03, 0.1, 0.06})},
       {}, kStiffness));
@@ -109,7 +109,7 @@ TEST_P(UnionContact, AStickInThePlaneOfAWallIsHeldByTheFloorAlone) {
   }
 }
 
-TEST_P(UnionContact, ACrackAsWideAsRoundingLetsNothingIn) {
+TEST_P(UnionContact, CracksAsWideAsRoundingLetNothingIn) {
   constexpr double kPressed = 1e-3;
   constexpr std::uint64_t kSeed = 5;
   Random random(kSeed);
@@ -162,7 +162,7 @@ TEST_P(UnionContact, CuttingAPartInTwoChangesNothing) {
   EXPECT_GT(in_contact, compared / 2);
 }
 
-TEST_P(UnionContact, AStartInsideIsFeltOnceItHasLeft) {
+TEST_P(UnionContact, StartInsideIsFeltOnceItLeft) {
   const Scene scene(object_of(
       {box_soup({-0.05, -0.05, -0.04}, {0, 0.05, 0}), box_soup({0, -0.05, -0.04}, {0.05, 0.05, 0})},
       {}, kStiffness));

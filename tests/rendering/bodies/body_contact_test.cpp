@@ -25,7 +25,7 @@ stimuli::Body& elastic(stimuli::Body& body) {
   return body;
 }
 
-TEST(BodyContact, HeadOnTheFirstStopsAndTheSecondMoves) {
+TEST(BodyContact, HeadOnFirstStopsAndSecondMoves) {
   BodyScene s;
   const Mesh cube = box_mesh(Vec3(0.05));
   elastic(s.moves(cube, {{0, 0, 0}, {1, 0, 0, 0}}, 0.2)).velocity = {1, 0, 0};
@@ -136,7 +136,7 @@ TEST(BodyContact, CradleOfBalls) {
   }
 }
 
-TEST(BodyContact, HeavyOnLightAtMostAHundredthOfAMillimetre) {
+TEST(BodyContact, HeavyOnLightSinksAtMostTenMicrometres) {
   BodyScene s;
   s.sleeps = false;
   s.gravity = {0, 0, -9.81};

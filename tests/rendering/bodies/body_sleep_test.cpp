@@ -38,7 +38,7 @@ double processor_seconds() {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 
-TEST(BodySleep, AStackAtRestFallsAsleepAndStaysInPlace) {
+TEST(BodySleep, RestingStackFallsAsleepAndStaysInPlace) {
   const Scene scene = stack_of_ten().scene();
   RenderState state = scene.initial_state();
   run(scene, state, 0.3);
@@ -87,7 +87,7 @@ TEST(BodySleep, AFallingBodyWakesSleepers) {
   EXPECT_GT(farthest_off(state), 1e-4);
 }
 
-TEST(BodySleep, TheProbeWakesTheTouchedBodyAndItsWholeStack) {
+TEST(BodySleep, ProbeWakesTheTouchedBodysWholeStack) {
   const Scene scene = stack_of_ten().scene();
   RenderState state = scene.initial_state();
   LineProbe probe{{0.1, 0, 0.275}, {0.22, 0, 0.275}};
@@ -123,7 +123,7 @@ TEST(BodySleep, ADriftingBodyDoesNotSleep) {
   EXPECT_NEAR(state.motion.bodies()[0].centre.x, 3e-8, 1e-15);
 }
 
-TEST(BodySleep, ACopyOfASleepingStateWakesTheSame) {
+TEST(BodySleep, CopiedSleepingStatesWakeTheSame) {
   BodyScene s = stack_of_ten();
   s.moves(box_mesh(Vec3(0.03)), {{0.01, 0, 6}, kUprightBody}, 0.5);
   const Scene scene = s.scene();

@@ -62,7 +62,7 @@ PlanarMotion after_impact(const PlanarImpact& of, const PlanarMotion& before) {
 }
 
 /// A tilted plank falls on an edge, with the edge's whole length on the floor.
-TEST(Bounce, APlankOnItsEdgeFollowsNewtonAndCoulomb) {
+TEST(Bounce, PlankOnEdgeFollowsNewtonAndCoulomb) {
   const double length = 0.2, height = 0.04, depth = 0.06, mass = 0.3;
   const double moment = mass / 12 * (length * length + height * height);
   for (const double friction : {0.0, 0.1, 0.4, 2.0}) {
@@ -217,7 +217,7 @@ TipResult bounce_on_tip(const TipBounce& of, double dt) {
   return result;
 }
 
-TEST(Bounce, AnOffCentreBounceOnTheTipKeepsEnergy) {
+TEST(Bounce, TipBounceOffCentreKeepsEnergy) {
   for (const double mass : {1e-3, 0.1, 10.0}) {
     for (const double stiffness : {200.0, 3000.0, 5e4}) {
       if (mass > 1 && stiffness < 1000) continue;  // it would go through the box
@@ -234,7 +234,7 @@ TEST(Bounce, AnOffCentreBounceOnTheTipKeepsEnergy) {
 }
 
 /// The tip passes through much of a light body, which turns far within a millisecond.
-TEST(Bounce, AFastBodyOnTheTipGainsNoEnergyAndGivesItsMomentum) {
+TEST(Bounce, FastBodyGivesTipMomentumGainingNoEnergy) {
   for (const double mass : {1e-3, 0.03, 1.0}) {
     for (const double stiffness : {3e3, 1e4, 5e4}) {
       for (const double speed : {1.0, 3.0, 10.0}) {
@@ -258,7 +258,7 @@ TEST(Bounce, AFastBodyOnTheTipGainsNoEnergyAndGivesItsMomentum) {
 
 /// A still stylus comes between the balls of a turning dumbbell. When both meet it, from opposite
 /// sides, the ideal stylus is centimetres away although nobody has pressed it so far.
-TEST(Bounce, DumbbellsThatTurnOnAStylusGainLittleEnergy) {
+TEST(Bounce, DumbbellsTurningOnAStylusGainLittleEnergy) {
   constexpr std::uint64_t kSeed = 105;
   Random random(kSeed);
   const Mesh ball = mesh_of(stimuli::icosphere(0.02, 3));
@@ -294,7 +294,7 @@ TEST(Bounce, DumbbellsThatTurnOnAStylusGainLittleEnergy) {
 
 /// A body on a wall does not fly off: at any speed, the hand gets the force of its present place,
 /// not the mean over the tick, which would be half a tick late and not passive.
-TEST(Bounce, ABodyOnAWallGivesTheForceOfItsPresentPlace) {
+TEST(Bounce, BodyOnWallPushesFromItsPresentPlace) {
   BodyScene s;
   s.stiffness = 1000;
   s.stands(box_mesh({0.1, 1, 1}), {{-0.05, 0, 0}, kAsItIs});
@@ -312,7 +312,7 @@ TEST(Bounce, ABodyOnAWallGivesTheForceOfItsPresentPlace) {
 }
 
 /// A body has afterwards the energy that the approaching hand gave it.
-TEST(Bounce, ABodyOnAMovingTipGainsTheWorkOfTheHand) {
+TEST(Bounce, BodyOnMovingTipGainsTheHandsWork) {
   for (const double mass : {1e-3, 0.1}) {
     for (const double stiffness : {1000.0, 5e4}) {
       const TipResult r = bounce_on_tip({mass, stiffness, 0.03, Vec3(0), {-0.2, 0, 0}}, 1e-3);
@@ -324,7 +324,7 @@ TEST(Bounce, ABodyOnAMovingTipGainsTheWorkOfTheHand) {
 
 /// Compares the motion, not only the energy: steps of a millisecond against steps of ten
 /// microseconds.
-TEST(Bounce, AnOffCentreBounceOnTheTipMatchesFineSteps) {
+TEST(Bounce, TipBounceOffCentreMatchesFineSteps) {
   for (const double off : {0.01, 0.04}) {
     const TipBounce of{0.1, 3000, off, Vec3(0.3, 1, 0.2)};
     const TipResult coarse = bounce_on_tip(of, 1e-3), fine = bounce_on_tip(of, 1e-5);

@@ -57,7 +57,7 @@ TEST(Complementarity, RedundantContactsAreHarmless) {
   EXPECT_NEAR(sum, 1, 1e-12);  // all four at speed 1: the mass is 1
 }
 
-TEST(Complementarity, FrictionIsAtMostItsShareOfTheNormal) {
+TEST(Complementarity, FrictionNeverExceedsItsShareOfTheNormal) {
   ComplementarityProblem p;
   // A unit mass that falls with speed 1 and slides with speed 2.
   p.add_row(1, 1e300);

@@ -76,7 +76,7 @@ RoughResult go_rough(const Rough& of, std::uint64_t seed) {
   return result;
 }
 
-TEST(ExtremeBodies, TheyNeverHaveMoreEnergyThanTheHandGave) {
+TEST(ExtremeBodies, NeverHaveMoreEnergyThanTheHandGave) {
   int touched = 0;
   for (const double stiffness : {1000.0, 5000.0, 5e4}) {
     for (const double speed : {0.5, 10.0}) {
@@ -98,7 +98,7 @@ TEST(ExtremeBodies, TheyNeverHaveMoreEnergyThanTheHandGave) {
 }
 
 /// 1 g between 10 kg and a wall, under 50 kN/m, pressed and released repeatedly.
-TEST(ExtremeBodies, AGramBetweenTenKilogramsAndAWallIsHeld) {
+TEST(ExtremeBodies, GramBetweenTenKilogramsAndWallIsHeld) {
   BodyScene s;
   s.stiffness = 5e4;
   s.stands(box_mesh({0.1, 1, 1}), {{-0.05, 0, 0}, {1, 0, 0, 0}});

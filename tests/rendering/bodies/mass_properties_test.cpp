@@ -44,7 +44,7 @@ TEST(MassProperties, BoxIsAsInTheTextbook) {
                 mass / 12 * Mat3(s2.y + s2.z, 0, 0, 0, s2.x + s2.z, 0, 0, 0, s2.x + s2.y), 1e-16);
 }
 
-TEST(MassProperties, SphereIsApproachedWithTheSquareOfTheEdge) {
+TEST(MassProperties, SphereErrorFallsWithSquareOfTheEdge) {
   const double r = 0.03;
   const double volume = 4.0 / 3 * std::numbers::pi * r * r * r;
   double last = 0;
@@ -61,7 +61,7 @@ TEST(MassProperties, SphereIsApproachedWithTheSquareOfTheEdge) {
   }
 }
 
-TEST(MassProperties, FarFromTheOriginAndTurnedTheyAreTheSame) {
+TEST(MassProperties, AreTheSameFarAwayAndTurned) {
   const Mesh mesh = box_mesh({0.1, 0.2, 0.05});
   const Quat q = glm::normalize(Quat(0.3, 0.4, -0.5, 0.7));
   const MassProperties here = whole(mesh), there = whole(mesh, {{300, -200, 100}, q});
@@ -148,7 +148,7 @@ Surface surface_of(const std::vector<std::pair<stimuli::PolygonSoup, Pose>>& sou
 
 /// A closed surface has the properties of the convex parts that it bounds; overlapping shells count
 /// once.
-TEST(MassProperties, OfAClosedSurface) {
+TEST(MassProperties, ClosedSurfaceMatchesTheUnionOfItsParts) {
   const Vec3 size_a(0.1, 0.04, 0.06), size_b(0.05, 0.09, 0.03);
   const Pose far{{3, -2, 1}, glm::normalize(Quat(1, 0.3, -0.2, 0.4))};
   const Pose beside{{0.5, 0, 0}, {1, 0, 0, 0}}, over{{0.02, 0.015, 0.01}, far.orientation};
@@ -169,7 +169,7 @@ TEST(MassProperties, OfAClosedSurface) {
 }
 
 /// Convex parts of a mesh with rounded coordinates abut with steps and gaps.
-TEST(MassProperties, OfPartsOfARoundedFile) {
+TEST(MassProperties, RoundedFilesPartsMatchItsSurface) {
   constexpr std::uint64_t kSeed = 11;
   Random random(kSeed);
   int cut = 0;

@@ -22,7 +22,7 @@ LineProbe pointing(const Vec3& tip) { return {tip, tip + Vec3(0.12, 0, 0)}; }
 
 /// A cube flies against the tip, held still, and returns with its speed; the hand gets the change
 /// of its momentum.
-TEST(MovingScene, ACubeComesBackFromTheTipWithItsEnergy) {
+TEST(MovingScene, CubeLeavesTheTipWithItsEnergy) {
   for (const double mass : {1e-3, 0.1, 10.0}) {
     for (const double stiffness : {200.0, 3000.0, 5e4}) {
       for (const Renderer* renderer : {&point_renderer(), &ray_renderer()}) {
@@ -46,7 +46,7 @@ TEST(MovingScene, ACubeComesBackFromTheTipWithItsEnergy) {
 }
 
 /// Struck off-centre it also turns; it loses the momentum that it gives the hand.
-TEST(MovingScene, PushedOffItsMiddleItTurnsAndMomentaBalance) {
+TEST(MovingScene, PushOffCentreTurnsItAndMomentaBalance) {
   BodyScene s;
   s.moves(box_mesh({0.05, 0.1, 0.05}), {{-0.05, 0, 0}, {1, 0, 0, 0}}, 0.1);
   const Scene scene = s.scene();
@@ -72,7 +72,7 @@ TEST(MovingScene, PushedOffItsMiddleItTurnsAndMomentaBalance) {
 
 /// A body that strikes a stylus fast makes steps of its own within a tick. The ideal stylus is the
 /// virtual one moved out of the body and not turned, whatever the body's orientation.
-TEST(MovingScene, AFastBodyDoesNotTurnTheIdealStylus) {
+TEST(MovingScene, FastBodyDoesNotTurnTheIdealStylus) {
   for (const double angle : {0.0, 0.4, 1.2, 2.5}) {
     BodyScene s;
     // About an axis other than the stylus's; else its direction would be the same in the body's
@@ -95,7 +95,7 @@ TEST(MovingScene, AFastBodyDoesNotTurnTheIdealStylus) {
   }
 }
 
-TEST(MovingScene, BetweenTipAndWallForceIsStiffnessTimesDepth) {
+TEST(MovingScene, TipToWallForceIsStiffnessTimesDepth) {
   for (const double mass : {1e-3, 0.1}) {
     for (const double stiffness : {1000.0, 5e4}) {
       BodyScene s;
@@ -145,7 +145,7 @@ TEST(MovingScene, AHeavyBodyFeelsLikeAWall) {
   EXPECT_GT(most, 1);
 }
 
-TEST(MovingScene, ANaNTailReachesNeitherHandNorBody) {
+TEST(MovingScene, NaNTailReachesNeitherHandNorBody) {
   BodyScene s;
   s.moves(box_mesh(Vec3(0.05)), {{0, 0, 0}, {1, 0, 0, 0}}, 0.1).velocity = {0.1, 0, 0};
   const Scene scene = s.scene();
@@ -163,7 +163,7 @@ TEST(MovingScene, ANaNTailReachesNeitherHandNorBody) {
   }
 }
 
-TEST(MovingScene, ScenesBeyondALimitAreRefusedWithTheLimit) {
+TEST(MovingScene, RefusesScenesBeyondALimitNamingIt) {
   BodyScene s;
   s.moves(box_mesh(Vec3(0.05)), {{0, 0, 0}, {1, 0, 0, 0}}, 1e-3);
   s.moves(box_mesh(Vec3(0.05)), {{1, 0, 0}, {1, 0, 0, 0}}, 1e4);
@@ -176,7 +176,7 @@ TEST(MovingScene, ScenesBeyondALimitAreRefusedWithTheLimit) {
 }
 
 /// A damped cube is pushed along beside another one that nothing touches, named before or after it.
-TEST(MovingScene, ABodyBesideThePressedOneTakesNoForceAway) {
+TEST(MovingScene, NeighbourOfPressedBodyTakesNoForceAway) {
   for (const double speed : {0.1, 1.0}) {  // m/s; the faster one takes steps within a tick
     std::array<std::vector<double>, 2> forces;
     for (const std::size_t order : {0U, 1U}) {
@@ -264,7 +264,7 @@ MovingObject heavy(double mass, const Vec3& spin, int object = 0) {
 
 /// A moving concave mesh is felt by its closed surface: the same as its convex parts, where those
 /// are exact.
-TEST(MovingScene, AConcaveBodyIsFeltByItsSurfaceAsByItsParts) {
+TEST(MovingScene, ConcaveBodysSurfaceFeelsLikeItsParts) {
   const Angle angle = angle_of(Quat(1, 0, 0, 0), false);
   const std::vector<MovingObject> moving = {heavy(40, {0.1, 0.05, 0.3})};
   const Scene by_parts = moving_scene(angle.parts, moving, Vec3(0));
@@ -288,7 +288,7 @@ TEST(MovingScene, AConcaveBodyIsFeltByItsSurfaceAsByItsParts) {
 
 /// A tip that moves straight into a wall of a rotated body is first felt at its true depth: between
 /// two ticks the stylus keeps its direction, however the body has turned.
-TEST(MovingScene, TheFirstTouchOfATurnedBodyIsAsDeepAsTheTipIs) {
+TEST(MovingScene, FirstTouchOfTurnedBodyHasTipsDepth) {
   const Angle angle = angle_of(Quat(1, 0, 0, 0), false);
   for (const bool surface : {false, true}) {
     for (int seed = 0; seed < 6; ++seed) {
@@ -319,7 +319,7 @@ TEST(MovingScene, TheFirstTouchOfATurnedBodyIsAsDeepAsTheTipIs) {
 
 /// Rounded as in a file of single precision and turning under the probe: the ideal tip is never
 /// inside the body.
-TEST(MovingScene, TheIdealTipStaysOutOfARoundedConcaveBody) {
+TEST(MovingScene, IdealTipStaysOutOfRoundedConcaveBody) {
   for (int seed = 0; seed < 12; ++seed) {
     const Quat turn = glm::normalize(Quat(1, 0.3 * seed, 0.7 - 0.2 * seed, 0.11 * seed));
     const Angle angle = angle_of(turn, true);

@@ -33,7 +33,7 @@ LineProbe pressed(int i) {
 
 /// 1000 t: the push does not move it. A body meets the probe within the tick, so the wrenches agree
 /// up to a tick's motion.
-TEST(MovingWrench, OfAHeavyBodyIsThatOfAFixedOne) {
+TEST(MovingWrench, HeavyBodyEqualsAFixedOne) {
   for (const Tool& tool : {Tool{}, fork()}) {
     BodyScene moving, still;
     const Mesh mesh = box_mesh({0.06, 0.06, 0.04});
@@ -151,7 +151,7 @@ void expect_that_of_one_that_stands_still(const Tool& tool, const Pose& pose,
   counts.left += before.contacts == 0 ? 1 : 0;
 }
 
-TEST(MovingWrench, OfAHeavyBodyIsThatOfAFixedOneOverEdgesAndCorners) {
+TEST(MovingWrench, HeavyBodyEqualsFixedOverEdgesAndCorners) {
   Tool prongs = fork();
   prongs.segments.pop_back();
   for (const std::uint64_t seed : {3, 17}) {

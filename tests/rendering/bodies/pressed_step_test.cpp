@@ -64,7 +64,7 @@ TEST(PressedStep, DampsSpeedAndSpin) {
 }
 
 /// Held against a wall by the probe, without friction, a body slides down as in free fall.
-TEST(PressedStep, ABodyPressedOnASmoothWallSlidesDown) {
+TEST(PressedStep, PressedBodySlidesDownASmoothWall) {
   BodyScene s;
   s.gravity = {0, 0, -9.81};
   const Mesh cube = box_mesh(Vec3(0.05));

@@ -86,7 +86,7 @@ TEST(SegmentDistance, IsTheLeastOverAFineGrid) {
   }
 }
 
-TEST(SoftContact, ForceIsTheSpringsBetweenVirtualAndIdealTool) {
+TEST(SoftContact, SpringBetweenVirtualAndIdealToolGivesForce) {
   const SoftObject object = slab(20000, 250, {});
   Press press(object, one_segment(Vec3(0, 0, 0.1)), {0.0003, 0.0002, 0});
   const Vec3 force = press.to_depth(0.004, 800);
@@ -99,7 +99,7 @@ TEST(SoftContact, ForceIsTheSpringsBetweenVirtualAndIdealTool) {
   EXPECT_LT(glm::length(force + on_body), 1e-12);
 }
 
-TEST(SoftContact, TheBodyBearsTheFeltForceAndTheToolRestsOnIt) {
+TEST(SoftContact, BodyBearsFeltForceUnderTheRestingTool) {
   const SoftObject object = slab(20000, 250, {});
   Press press(object, one_segment(Vec3(0, 0, 0.1)), {0.0003, 0.0002, 0});
   const Vec3 force = press.to_depth(0.004, 1500);
@@ -133,7 +133,7 @@ double ball_against_theory(int resolution) {
   return force / (4.0 / 3 * modulus * std::sqrt(kRadius) * std::pow(depth, 1.5) * thin);
 }
 
-TEST(SoftContact, ABallComesNearerToHertzAsTheMeshGetsFiner) {
+TEST(SoftContact, FinerMeshesBringABallNearerToHertz) {
   const double coarse = ball_against_theory(4), fine = ball_against_theory(10);
   EXPECT_GT(fine, 0.9);
   EXPECT_LT(fine, 1.25);
@@ -190,7 +190,7 @@ void press_through(double thickness, double radius, double stiffness, double spe
   EXPECT_GT(last.z, 0.8 * stiffness * 0.02);  // rests on the base
 }
 
-TEST(SoftContact, PressedToItsBaseItPushesBackAndLetsNothingThrough) {
+TEST(SoftContact, PushesBackAndHoldsPressedToItsBase) {
   for (const double speed : {0.01, 0.08, 0.5}) {
     SCOPED_TRACE(speed);
     press_through(0.03, 0.004, 2000, speed);
@@ -215,7 +215,7 @@ TEST(SoftContact, SeveralSegmentsOfOneToolPressAtOnce) {
   EXPECT_LT(all.z, 3 * one);  // each lowers the surface for the others
 }
 
-TEST(SoftContact, ATrialThatBeginsInsideHasNoForceUntilItHasLeft) {
+TEST(SoftContact, StartInsideHasNoForceUntilItLeaves) {
   const SoftObject object = slab(20000, 250, {});
   SoftObjectState state = initial_state(object);
   const PlacedTool tool = one_segment(Vec3(0, 0, 0.1));
@@ -247,7 +247,7 @@ TEST(SoftContact, ATickNeitherAllocatesNorGivesNaN) {
   EXPECT_EQ(runner::evidence::allocations(), before);
 }
 
-TEST(SoftContact, TheSamePathGivesTheSameForcesToTheBit) {
+TEST(SoftContact, SamePathGivesSameForcesToTheBit) {
   const SoftObject object = slab(20000, 250, {});
   Press first(object, one_segment(Vec3(0, 0, 0.1)), {0.0003, 0.0002, 0});
   Press second(object, one_segment(Vec3(0, 0, 0.1)), {0.0003, 0.0002, 0});

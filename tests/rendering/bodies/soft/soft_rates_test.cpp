@@ -54,7 +54,7 @@ TEST(SoftRates, AreThoseOfTheMapInTheReadme) {
   }
 }
 
-TEST(SoftRates, TheirLimitsAre10And20KilopascalAndAMegapascal) {
+TEST(SoftRates, LimitsAreTenTwentyAndAThousandKilopascal) {
   const auto just_below = [](double limit) { return std::nextafter(limit, 0); };
   EXPECT_EQ(lowest(just_below(1e4), 0.01), lowest(1e3, 0.01));
   EXPECT_EQ(lowest(just_below(2e4), 0.01), lowest(1e4, 0.01));
@@ -64,7 +64,7 @@ TEST(SoftRates, TheirLimitsAre10And20KilopascalAndAMegapascal) {
 }
 
 /// Steps take at most a quarter of their time, and would take more at twice the rate.
-TEST(SoftRates, ABodyHasTheHighestRateAtWhichAQuarterOfTheTimeIsEnough) {
+TEST(SoftRates, HasHighestRateUsingAQuarterOfTime) {
   for (const double young : {2e4, 3e6}) {
     for (int resolution = 2; resolution <= (young < 1e5 ? 8 : 10); ++resolution) {
       stimuli::ObjectSpec spec;

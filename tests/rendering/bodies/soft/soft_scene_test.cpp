@@ -109,7 +109,7 @@ TEST(SoftScene, LongTicksAreCutInPieces) {
   EXPECT_NEAR(at_100_hz.force.z / at_1_khz.force.z, 1, 1e-6);
 }
 
-TEST(SoftScene, AFreeBlockFallsAsFarInLongTicksAsInShortOnes) {
+TEST(SoftScene, FallsEquallyFarInLongAndShortTicks) {
   stimuli::ObjectSpec spec = soft_cube(20000);
   spec.soft->resolution = 2;
   spec.soft->fixed = stimuli::Soft::Fixed::none;
@@ -128,7 +128,7 @@ TEST(SoftScene, AFreeBlockFallsAsFarInLongTicksAsInShortOnes) {
   EXPECT_NEAR(fallen(1), fine, 0.02);
 }
 
-TEST(SoftScene, WithoutAResolutionItHasTheHighestThatCanBeStepped) {
+TEST(SoftScene, DefaultsToTheHighestSteppableResolution) {
   stimuli::ObjectSpec plain = soft_cube(20000);
   plain.soft->resolution = 0;
   const auto found = build_soft_object(plain, Pose{}, {});
@@ -176,7 +176,7 @@ TEST(SoftScene, FixedPointsAreOnTheObject) {
   }
 }
 
-TEST(SoftScene, ACopiedStateContinuesTheSameAndNaNGivesNoForce) {
+TEST(SoftScene, CopiedStatesContinueNaNGivesNoForce) {
   const Scene scene = two_cubes(true);
   RenderState state = scene.initial_state();
   press(ray_renderer(), scene, state, 0.002, 0.003);
@@ -257,7 +257,7 @@ TEST(SoftScene, BodiesThatCannotBeSteppedAreRefused) {
   EXPECT_THROW(build_soft_object(held, Pose{}, {}), stimuli::MeshError);
 }
 
-TEST(SoftScene, TicksWithSeveralDoNotAllocateNorDoThoseOfACopy) {
+TEST(SoftScene, TicksOfSeveralOrACopyNeverAllocate) {
   Pose beside;
   beside.position.x = 0.06;
   const Scene scene = soft_scene(Scene({}, true), {},

@@ -98,7 +98,7 @@ TEST(SoftSolid, TheGradientIsTheSlopeOfTheEnergy) {
   }
 }
 
-TEST(SoftSolid, TheStiffnessIsTheSlopeOfTheGradientAtRest) {
+TEST(SoftSolid, StiffnessIsTheGradientsSlopeAtRest) {
   const stimuli::SolidMesh mesh = soft_mesh(ShapeKind::cylinder, 2);
   const Solid solid(mesh, {.young = 30000, .poisson = 0.4});
   constexpr std::uint64_t kSeed = 5;
@@ -223,7 +223,7 @@ Pressed pressed_box(double poisson) {
   return pressed;
 }
 
-TEST(SoftSolid, NearlyIncompressibleKeepsItsVolumeAndDoesNotLock) {
+TEST(SoftSolid, NearlyIncompressibleKeepsVolumeWithoutLocking) {
   const Pressed soft = pressed_box(0.3), pressed = pressed_box(0.49);
   const Solid& solid = pressed.body.solid();
   const auto sunk = [](const Pressed& p) { return farthest(p.state.x, p.body.mesh().nodes); };
@@ -250,7 +250,7 @@ TEST(SoftSolid, FallsFreelyWithoutSupport) {
     EXPECT_LT(glm::distance(state.x[i], mesh.nodes[i] - Vec3(0, 0, fallen)), 1e-9);
 }
 
-TEST(SoftSolid, ASmallBodyFallsAsFastAsALargeOne) {
+TEST(SoftSolid, SmallBodiesFallAsFastAsLargeOnes) {
   for (const double size : {0.002, 0.02}) {
     const stimuli::SolidMesh mesh = stimuli::mesh_of_box(Vec3(size), {2, 2, 2});
     const SoftBody body(
