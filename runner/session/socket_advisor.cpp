@@ -81,6 +81,7 @@ SocketAdvisor::SocketAdvisor(const protocols::Protocol& protocol, Settings setti
                              const std::vector<data::TrialRecord>& history)
     : protocol_(protocol), settings_(std::move(settings)) {
   for (const data::TrialRecord& record : history) {
+    if (!record.task.of_block()) continue;
     history_ += (history_.empty() ? "" : ",") + json_of(record).dump();
   }
   if (!connect()) throw std::invalid_argument(settings_.path + ": " + trouble_);

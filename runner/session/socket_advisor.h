@@ -2,7 +2,7 @@
 // Levels proposed by a program at a Unix domain socket on this machine: one JSON object a line.
 //
 //   to it    {"type": "begin", "version": 1, "protocol": NAME, "participant": NUMBER, "session": S,
-//             "history": [TRIAL, ...]}              once a connection; trials that are on record
+//             "history": [TRIAL, ...]}              once a connection; trials of blocks on record
 //            {"type": "ask", "trial": T, "block": NAME, "track": K, "stimulus": NAME,
 //             "renderer": NAME, "path": POINTER, "least": X, "most": Y, "own": LEVEL}
 //            {"type": "tell", TRIAL...}             after every trial of an adaptive block
