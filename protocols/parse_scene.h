@@ -20,11 +20,7 @@ void read_tool(ObjectReader& reader, ToolSpec& tool);
 void check_radius(ObjectReader& reader, const ToolSpec& tool, bool soft);
 void read_reach(ObjectReader& reader, std::optional<ReachSpec>& reach);
 
-// Reading of moving bodies (scene.schema.json), for scenes and protocols.
-
-/// The key `body` of an object.
-void read_body(ObjectReader& reader, std::optional<stimuli::Body>& body);
-
+/// Reading of moving bodies (scene.schema.json), for scenes and protocols.
 /// gravity_m_per_s2.
 void read_gravity(ObjectReader& reader, Vec3& gravity);
 

@@ -75,8 +75,7 @@ class DirectionCells {
   int resolution_ = 0;
 };
 
-// The start of hill climbing for the support function (separation.h) on a large mesh.
-
+/// The start of hill climbing for the support function (separation.h) on a large mesh.
 /// A cube map of directions with the support vertex of each cell's middle, so that a climb takes a
 /// few steps for any number of vertices. Small meshes need few steps anyway and have no map.
 class SupportMap {
@@ -98,8 +97,7 @@ class SupportMap {
   std::vector<std::uint32_t> cells_;
 };
 
-// The start of walks over a large mesh: the facet by which a ray from its middle leaves it.
-
+/// The start of walks over a large mesh: the facet by which a ray from its middle leaves it.
 /// A cube map of directions with the facet by which each cell's middle ray leaves the mesh, so that
 /// a walk begins a few facets from its end for any number of facets. Directions are those of a
 /// frame in which the mesh is equally wide in all directions (a linear map, from the second moments

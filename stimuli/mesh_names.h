@@ -45,8 +45,7 @@ class MeshNaming {
   std::shared_ptr<const MeshNames> names_;
 };
 
-// The list of faults of a mesh.
-
+/// The list of faults of a mesh.
 /// Collects the faults of a mesh: the first few of each kind in full, then a count.
 class MeshFaults {
  public:

@@ -145,8 +145,7 @@ inline constexpr auto kShapes = [] {
   return all;
 }();
 
-// Poses within poses.
-
+/// Poses within poses.
 /// The pose, in the frame of the parent of `outer`, of an object that has the pose `inner` in the
 /// frame of `outer`.
 inline Pose compose(const Pose& outer, const Pose& inner) {

@@ -131,8 +131,7 @@ constexpr std::size_t kShownRenderers = 6;
 /// Largest number of participants drawn one by one.
 constexpr std::size_t kShownParticipants = 200;
 
-// Figures of tasks.
-
+/// Figures of tasks.
 /// For each stimulus in a block with means over participants: "group1", ...: a panel for each
 /// measure with every participant, the mean and its 95 % interval, by renderer. For each block of
 /// ratings on steps or without levels: "rating1", ...: means of the stimuli and shares of the

@@ -44,8 +44,7 @@ void add_interval_across(Panel& panel, Role role, double y, double low, double h
 /// Corners of right, left, cross and saltire within -1 to 1, y down; empty for the other shapes.
 std::vector<std::pair<double, double>> outline_of(MarkerShape shape);
 
-// Places the labels of data points with the least overlap.
-
+/// Places the labels of data points with the least overlap.
 /// The panel's labels (Mark::Kind::label) as texts beside their points: each, in order, at the
 /// candidate position (right or left, several heights) that overlaps the fewest points, intervals,
 /// lines and labels placed before. \param width px, of the panel as it is drawn

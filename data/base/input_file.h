@@ -36,8 +36,7 @@ class InputFile {
 /// The whole file. \throws as InputFile.
 std::string read_whole(const std::string& path, std::uintmax_t most_bytes);
 
-// Numbers in binary files.
-
+/// Numbers in binary files.
 /// Reads an unsigned little-endian number of `size` (1 to 4) bytes, which must exist, at byte `at`.
 inline std::uint32_t little_endian(std::string_view bytes, std::size_t at, std::size_t size = 4) {
   std::uint32_t word = 0;

@@ -35,8 +35,7 @@ inline ExportResult export_csv(Store& store, const std::string& path, bool force
   return export_csv(store, path, ExportSettings{.force = force});
 }
 
-// Export of a sweep as CSV: one row a point.
-
+/// Export of a sweep as CSV: one row a point.
 /// Writes the points on record, in order, with the columns of sweep_columns(). As export_csv()
 /// writes: RFC 4180, the shortest texts of numbers that read back exactly, texts guarded; complete
 /// or not at all. Undefined figures and those of failed points are empty. \param progress called

@@ -84,8 +84,7 @@ inline constexpr const char* kGuardSentence =
 /// JSON as the text of a file. Invalid UTF-8 is replaced.
 std::string json_text(const nlohmann::ordered_json& json);
 
-// Internal to data/export: a table that explains the columns of trials.csv and attempts.csv.
-
+/// Internal to data/export: a table that explains the columns of trials.csv and attempts.csv.
 /// RFC 4180 with the header table,column,unit,value,meaning: a row for each column, followed by one
 /// for each of its codes or fault bits. \param trials  columns of trials.csv
 void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSettings& settings,

@@ -166,8 +166,7 @@ std::span<const Column> page_columns();
 std::int64_t write_pages(Store& store, TextSink& out, const ExportClock& clock,
                          ExportedParticipants& participants);
 
-// Completed trials in memory, as trials.csv has them.
-
+/// Completed trials in memory, as trials.csv has them.
 /// Columns with the names, order and values of an exported trials.csv with absolute times; texts
 /// are not guarded against spreadsheets.
 class TrialTable {

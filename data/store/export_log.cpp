@@ -29,6 +29,19 @@ std::string short_hash(const std::string& place) {  // FNV-1a
   return text.str();
 }
 
+/// How `path` is recorded: relative to the folder of the database or, outside of it, as the file
+/// name with a hash of the path, "trials.csv (elsewhere, 1f3c9a02)". So a database that is shared
+/// does not reveal the folders of a computer.
+std::string recorded_path(const std::string& database, const std::string& path) {
+  namespace fs = std::filesystem;
+  fs::path place = fs::weakly_canonical(fs::absolute(path));
+  if (!place.has_filename()) place = place.parent_path();
+  const fs::path folder = fs::weakly_canonical(fs::absolute(database)).parent_path();
+  const fs::path within = place.lexically_relative(folder);
+  if (!within.empty() && *within.begin() != "..") return within.string();
+  return place.filename().string() + kElsewhere + short_hash(place.string()) + ")";
+}
+
 /// Earlier versions of palpate recorded absolute paths.
 void shorten_paths(SQLite::Database& db, const std::string& file) {
   SQLite::Statement find(db, "SELECT id, path FROM exports WHERE substr(path, 1, 1) = '/'");
@@ -89,16 +102,6 @@ void insert_participants(SQLite::Database& db, const std::string& database, std:
 }
 
 }  // namespace
-
-std::string recorded_path(const std::string& database, const std::string& path) {
-  namespace fs = std::filesystem;
-  fs::path place = fs::weakly_canonical(fs::absolute(path));
-  if (!place.has_filename()) place = place.parent_path();
-  const fs::path folder = fs::weakly_canonical(fs::absolute(database)).parent_path();
-  const fs::path within = place.lexically_relative(folder);
-  if (!within.empty() && *within.begin() != "..") return within.string();
-  return place.filename().string() + kElsewhere + short_hash(place.string()) + ")";
-}
 
 std::string export_location(const std::string& database, const std::string& recorded) {
   namespace fs = std::filesystem;

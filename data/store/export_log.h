@@ -10,15 +10,10 @@
 namespace palpate::data {
 
 struct ExportRecord {
-  std::string path;    ///< as returned by recorded_path()
+  std::string path;    ///< relative to the database where it lies below its folder
   std::string format;  ///< "csv", "bids", "psych-ds"
   std::int64_t made_utc_ns = 0;
 };
-
-/// How `path` is recorded: relative to the folder of the database or, outside of it, as the file
-/// name with a hash of the path, "trials.csv (elsewhere, 1f3c9a02)". So a database that is shared
-/// does not reveal the folders of a computer.
-std::string recorded_path(const std::string& database, const std::string& path);
 
 /// The absolute path of a recorded one; "" outside of the folder of the database.
 std::string export_location(const std::string& database, const std::string& recorded);

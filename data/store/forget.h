@@ -47,8 +47,7 @@ class Tombstones {
   std::map<Key, std::vector<std::string>> by_key_;
 };
 
-// Internal to data/store: copies of a participant's data that a withdrawal does not remove.
-
+/// Internal to data/store: copies of a participant's data that a withdrawal does not remove.
 /// Whether `text` contains `code` as a separate word.
 bool mentions(const std::string& text, const std::string& code);
 

@@ -152,8 +152,7 @@ class ChainCheck {
   std::map<std::int64_t, Waiting> waiting_;
 };
 
-// Internal to data/store: seals rows (seals.h) in the transaction that writes them.
-
+/// Internal to data/store: seals rows (seals.h) in the transaction that writes them.
 /// Each call reads back the row as it was stored and seals it as the next of its session. Caches
 /// the last link of every session: call reset_chains() after a rollback and after deleting
 /// sessions.

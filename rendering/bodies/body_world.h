@@ -227,8 +227,7 @@ struct SpringPass {
 /// \param duration  s
 SpringPass pass_spring(const SpringStart& start, double duration);
 
-// The contacts of a step and the impulses in them. Internal to body_world.cpp.
-
+/// The contacts of a step and the impulses in them. Internal to body_world.cpp.
 class BodyContacts {
  public:
   /// m; closer parts touch. Above rounding, below perception.

@@ -103,36 +103,6 @@ void PairDevice::reopen() {
   tail_->reopen();
 }
 
-void check_pair(const servo::DeviceConfig& config, const char* name) {
-  if (config.serials.size() != 2 || config.serials[0] == config.serials[1]) {
-    throw std::invalid_argument(std::string(name) +
-                                " needs the serial numbers of two devices: first the one at the "
-                                "stylus' tip, then the one at its tail (palpate devices lists "
-                                "them)");
-  }
-  registration_of(calibration_of_pair(config), config, name);
-}
-
-std::unique_ptr<servo::Device> open_pair(const servo::DeviceConfig& config, const char* name,
-                                         OpenEnd open_end) {
-  const Calibration calibration = calibration_of_pair(config);
-  const PairRegistration& pair = registration_of(calibration, config, name);
-  servo::DeviceConfig one = config;
-  one.serials = {config.serials[0]};
-  std::unique_ptr<servo::Device> tip = open_end(one);
-  one.serials = {config.serials[1]};
-  std::unique_ptr<servo::Device> tail = open_end(one);
-  const CalibrationVerdict known =
-      judge_pair(calibration, config.serials[0], config.serials[1],
-                 std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1));
-  const std::string text = (known.state == CalibrationState::good ? "" : "stale: ") + known.text +
-                           "; " + tip->capabilities().calibration + "; " +
-                           tail->capabilities().calibration;
-  return std::make_unique<PairDevice>(std::move(tip), std::move(tail),
-                                      StylusFromEnds(pair.tail_in_tip, pair.stylus_length), name,
-                                      text);
-}
-
 namespace {
 
 using Json = nlohmann::json;
@@ -161,6 +131,17 @@ servo::DeviceCapabilities as_opened(const servo::DeviceConfig& config) {
 [[maybe_unused]] constexpr char kInverse3x2[] = "inverse3x2";
 [[maybe_unused]] constexpr char kTouch2[] = "touch2";
 
+/// See DeviceKind::check. \throws std::invalid_argument, InputError: no registration of the two
+void check_pair(const servo::DeviceConfig& config, const char* name) {
+  if (config.serials.size() != 2 || config.serials[0] == config.serials[1]) {
+    throw std::invalid_argument(std::string(name) +
+                                " needs the serial numbers of two devices: first the one at the "
+                                "stylus' tip, then the one at its tail (palpate devices lists "
+                                "them)");
+  }
+  registration_of(calibration_of_pair(config), config, name);
+}
+
 template <const char* name>
 void check_named(const servo::DeviceConfig& config) {
   check_pair(config, name);
@@ -169,6 +150,28 @@ void check_named(const servo::DeviceConfig& config) {
 template <const char* name, servo::DeviceCapabilities (*nominal)(const servo::DeviceConfig&)>
 servo::DeviceCapabilities nominal_pair(const servo::DeviceConfig& config) {
   return pair_of(nominal(config), name);
+}
+
+/// Opens the two devices of config.serials, the one at the stylus's tip first. \throws
+/// std::runtime_error
+std::unique_ptr<servo::Device> open_pair(const servo::DeviceConfig& config, const char* name,
+                                         OpenEnd open_end) {
+  const Calibration calibration = calibration_of_pair(config);
+  const PairRegistration& pair = registration_of(calibration, config, name);
+  servo::DeviceConfig one = config;
+  one.serials = {config.serials[0]};
+  std::unique_ptr<servo::Device> tip = open_end(one);
+  one.serials = {config.serials[1]};
+  std::unique_ptr<servo::Device> tail = open_end(one);
+  const CalibrationVerdict known =
+      judge_pair(calibration, config.serials[0], config.serials[1],
+                 std::chrono::system_clock::now().time_since_epoch() / std::chrono::nanoseconds(1));
+  const std::string text = (known.state == CalibrationState::good ? "" : "stale: ") + known.text +
+                           "; " + tip->capabilities().calibration + "; " +
+                           tail->capabilities().calibration;
+  return std::make_unique<PairDevice>(std::move(tip), std::move(tail),
+                                      StylusFromEnds(pair.tail_in_tip, pair.stylus_length), name,
+                                      text);
 }
 
 template <const char* name, OpenEnd open_end>

@@ -45,12 +45,6 @@ using OpenEnd = std::unique_ptr<servo::Device> (*)(const servo::DeviceConfig& co
 
 /// Capabilities of a pair. \param end  those of each device
 servo::DeviceCapabilities pair_of(const servo::DeviceCapabilities& end, const char* name);
-/// See DeviceKind::check. \throws std::invalid_argument, InputError: no registration of the two
-void check_pair(const servo::DeviceConfig& config, const char* name);
-/// Opens the two devices of config.serials, the one at the stylus's tip first. \throws
-/// std::runtime_error
-std::unique_ptr<servo::Device> open_pair(const servo::DeviceConfig& config, const char* name,
-                                         OpenEnd open_end);
 
 struct DeviceKind {
   const char* name;

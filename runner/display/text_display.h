@@ -76,9 +76,8 @@ std::string wrapped(const std::string& text, std::size_t columns);
 /// Width of the terminal at a file descriptor; 0: not a terminal, or its width is unknown.
 std::size_t columns_of(int file);
 
-// Parses terminal input: single keys are answers, a line that begins with ':' is a command, Escape
-// and F12 are emergency keys, and so is Alt with any key.
-
+/// Parses terminal input: single keys are answers, a line that begins with ':' is a command, Escape
+/// and F12 are emergency keys, and so is Alt with any key.
 class TextInput {
  public:
   struct Unknown {

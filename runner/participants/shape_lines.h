@@ -650,8 +650,7 @@ inline void find_at_tip(const SolidLine& shape, Deepest& out, int count = ShapeH
   find_surface(shape, 0, out, count);
 }
 
-// The class of lines for each stimulus.
-
+/// The class of lines for each stimulus.
 /// Calls visit(std::type_identity<ShapeLine>()) with the class of the stimulus.
 template <class Visit>
 void visit_line_class(const ShapeHypotheses::Shape& shape, Visit&& visit) {

@@ -19,12 +19,11 @@
 #include "data/store/store.h"
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
-#include "runner/commands/shared/command.h"
-#include "runner/commands/shared/study_options.h"
 #include "runner/session/simulated_study.h"
 #include "runner/study/simulation_limits.h"
 #include "runner/study/task_words.h"
 #include "runner/touch/forces.h"
+#include "runner/usage_error.h"
 #include "stimuli/convex_mesh.h"
 
 namespace palpate::runner {

@@ -16,10 +16,9 @@
 
 namespace palpate::runner::session {
 
-// The check of the force's direction: a weak push to the right before the first trial. The
-// participant feels whether forces have the right direction, and the commands are checked against
-// the limits.
-
+/// The check of the force's direction: a weak push to the right before the first trial. The
+/// participant feels whether forces have the right direction, and the commands are checked against
+/// the limits.
 /// A constant force to the right: 1 N, or half of the largest force allowed where that is less.
 class ForceDirectionCheck final : public rendering::Renderer {
  public:

@@ -20,8 +20,7 @@
 
 namespace palpate::runner::session {
 
-// A device that plays a recorded trial back to the servo: recorded poses at the recorded times.
-
+/// A device that plays a recorded trial back to the servo: recorded poses at the recorded times.
 /// Device and clock in one: each tick is one recorded period after the last. Its readings are in
 /// the virtual frame, so the servo needs no workspace map. `samples` must outlive it. After the
 /// last sample the device is lost.

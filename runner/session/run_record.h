@@ -31,8 +31,7 @@ inline bool same_body(const data::BodyRecord& a, const data::BodyRecord& b) {
          a.velocity == b.velocity && a.spin == b.spin;
 }
 
-// From a parsed protocol to the record of it.
-
+/// From a parsed protocol to the record of it.
 /// A protocol as the store keeps it: its text, and the contents of every file that it names.
 data::ProtocolInfo info_of(const protocols::Protocol& protocol);
 

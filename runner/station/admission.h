@@ -16,8 +16,7 @@
 
 namespace palpate::runner::station {
 
-// Participant codes that are easily mistaken for each other.
-
+/// Participant codes that are easily mistaken for each other.
 /// The codes of `known` that `code` may stand for: spelt otherwise (P01, p01, P1, PO1), or one
 /// letter away (PP01, SUJB01). Codes that differ only by digits are different participants: P01,
 /// P02.

@@ -58,8 +58,7 @@ std::vector<std::string> keyboard_parts(const protocols::Protocol& protocol);
 /// Position of the interval compared with the standard, from 1; 0: none.
 int comparison_interval(const protocols::TaskBlock& block, const protocols::Trial& trial);
 
-// How well the procedures of a protocol find a known threshold, for `schedule --recover`.
-
+/// How well the procedures of a protocol find a known threshold, for `schedule --recover`.
 /// A line for each procedure: its target, bias and spread over the simulated participants.
 /// \param format  table, csv or json
 std::string recovery_text(const protocols::Protocol& protocol, int participants, std::uint64_t seed,

@@ -183,23 +183,12 @@ std::uint64_t permuted(std::uint64_t value, std::uint64_t count, std::uint64_t k
   return value;
 }
 
-// JSON pointers into documents: set a value; suggest pointers similar to an unknown one.
-
-/// The value that a pointer leads to; nullptr: there is none.
-const nlohmann::json* value_at(const nlohmann::json& document, const std::string& pointer);
-
-/// Sets it. Members of objects are added where they are missing, elements of arrays are not.
-/// \return false: it leads through an array's end, or into a number or a text
-bool set_value(nlohmann::json& document, const std::string& pointer, const nlohmann::json& value);
-
-/// Pointers of the document's numbers, texts and booleans that are written much like this one, the
-/// nearest first, at most `most`.
-std::vector<std::string> near_pointers(const nlohmann::json& document, const std::string& pointer,
-                                       std::size_t most = 3);
-
 namespace {
 
 using nlohmann::json;
+using protocols::child_pointer;
+using protocols::SweepParameter;
+using protocols::SweptDocument;
 
 std::vector<std::string> tokens_of(const std::string& pointer) {
   std::vector<std::string> tokens;
@@ -218,8 +207,7 @@ Json* element(Json& array, const std::string& token) {
   return number && index < array.size() ? &array[index] : nullptr;
 }
 
-}  // namespace
-
+/// The value that a pointer leads to; nullptr: there is none.
 const json* value_at(const json& document, const std::string& pointer) {
   const json* at = &document;
   for (const std::string& token : tokens_of(pointer)) {
@@ -236,6 +224,8 @@ const json* value_at(const json& document, const std::string& pointer) {
   return at;
 }
 
+/// Sets it. Members of objects are added where they are missing, elements of arrays are not.
+/// \return false: it leads through an array's end, or into a number or a text
 bool set_value(json& document, const std::string& pointer, const json& value) {
   json* at = &document;
   for (const std::string& token : tokens_of(pointer)) {
@@ -252,8 +242,10 @@ bool set_value(json& document, const std::string& pointer, const json& value) {
   return true;
 }
 
+/// Pointers of the document's numbers, texts and booleans that are written much like this one, the
+/// nearest first, at most `most`.
 std::vector<std::string> near_pointers(const json& document, const std::string& pointer,
-                                       std::size_t most) {
+                                       std::size_t most = 3) {
   std::vector<std::pair<std::size_t, std::string>> found;
   const std::string last = pointer.substr(pointer.rfind('/') + 1);
   const json flat = document.flatten();
@@ -272,13 +264,6 @@ std::vector<std::string> near_pointers(const json& document, const std::string& 
   }
   return out;
 }
-
-namespace {
-
-using nlohmann::json;
-using protocols::child_pointer;
-using protocols::SweepParameter;
-using protocols::SweptDocument;
 
 /// 53 bits: every reader of JSON takes them exactly.
 std::uint64_t short_seed(std::uint64_t sweep_seed, std::int64_t point, std::uint64_t use) {

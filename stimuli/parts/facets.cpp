@@ -138,6 +138,16 @@ class EarCutter {
   const Vec3 normal_;
 };
 
+/// Whether a simple plane polygon has no reflex corner (beyond rounding).
+bool is_convex_polygon(std::span<const Vec3> corners, const Vec3& normal) {
+  const std::size_t count = corners.size();
+  for (std::size_t k = 0; k < count; ++k) {
+    const Vec3 &a = corners[k], &b = corners[(k + 1) % count], &c = corners[(k + 2) % count];
+    if (sine_at(a, b, c, normal) < -kStraight) return false;
+  }
+  return true;
+}
+
 }  // namespace
 
 FacetedSolid faceted_solid(const HalfEdges& mesh, PlaneTable& planes, MeshFaults& faults) {
@@ -188,15 +198,6 @@ FacetedSolid faceted_solid(const HalfEdges& mesh, PlaneTable& planes, MeshFaults
                              {mesh.origin[h], mesh.origin[mesh.next(h)]}});
   }
   return solid;
-}
-
-bool is_convex_polygon(std::span<const Vec3> corners, const Vec3& normal) {
-  const std::size_t count = corners.size();
-  for (std::size_t k = 0; k < count; ++k) {
-    const Vec3 &a = corners[k], &b = corners[(k + 1) % count], &c = corners[(k + 2) % count];
-    if (sine_at(a, b, c, normal) < -kStraight) return false;
-  }
-  return true;
 }
 
 TriangleSurface triangulate(std::span<const Vec3> corners, const Vec3& normal) {

@@ -104,7 +104,7 @@ TEST_P(LayerThatBreaks, BreaksWhateverElseTheObjectHas) {
 
 INSTANTIATE_TEST_SUITE_P(UnderSurfaces, LayerThatBreaks, ::testing::Values(0.0, 0.001, 50.0));
 
-TEST(SceneBuilder, AStartAboveALayerIsInsideAnObjectWithoutSurfaceStiffness) {
+TEST(SceneBuilder, BareLayersAreInsideFromTheStart) {
   for (const double surface : {0.0, 0.001}) {
     Press press(cube(of(surface, {{0.012, 500, 0, {}}})));
     for (const double depth : {0.010, 0.015, 0.022, 0.003}) {
@@ -269,7 +269,7 @@ stimuli::ObjectSpec angle(const std::string& file, const stimuli::Material& mate
   return spec;
 }
 
-TEST(SceneBuilder, ABodyHasTheMassOfAllItsPartsWhateverIsFeltOfThem) {
+TEST(SceneBuilder, BodyMassCountsAllParts) {
   const palpate::testing::TemporaryFolder folder;
   const stimuli::Material felt = of(800, {}), layer = of(0, {{0.002, 500, 0, {}}}),
                           both = of(300, {{0.002, 500, 0, {}}});

@@ -14,17 +14,6 @@
 
 namespace palpate::runner::commands {
 
-// The findings of `palpate replay`, as text, JSON and CSV.
-
-/// \param name  "P03/1/12", as the trial was named
-std::string to_text(const std::string& name, const session::RecordedTrial& trial,
-                    const session::ReplayComparison& found);
-std::string to_json_text(const std::string& name, const session::RecordedTrial& trial,
-                         const session::ReplayComparison& found);
-/// A row for each tick: s, m, N, N m; the other renderer's columns if requested. For a trial of
-/// version 2 `interval` comes first, and t counts within it.
-std::string to_csv(const session::RecordedTrial& trial, const session::ReplayComparison& found);
-
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -147,8 +136,7 @@ std::string csv_header(bool with_other, bool with_intervals, bool with_body) {
   return header + "\n";
 }
 
-}  // namespace
-
+/// \param name  "P03/1/12", as the trial was named
 std::string to_text(const std::string& name, const session::RecordedTrial& trial,
                     const session::ReplayComparison& found) {
   const data::TrialRecord& record = trial.stored.record;
@@ -195,6 +183,8 @@ std::string to_json_text(const std::string& name, const session::RecordedTrial& 
   return result.dump(1) + "\n";
 }
 
+/// A row for each tick: s, m, N, N m; the other renderer's columns if requested. For a trial of
+/// version 2 `interval` comes first, and t counts within it.
 std::string to_csv(const session::RecordedTrial& trial, const session::ReplayComparison& found) {
   const data::TrialRecord& record = trial.stored.record;
   const bool with_intervals = !record.task.intervals.empty();
@@ -214,6 +204,8 @@ std::string to_csv(const session::RecordedTrial& trial, const session::ReplayCom
   }
   return text;
 }
+
+}  // namespace
 
 // `palpate replay`: runs a stored trial through the servo and its renderer again.
 

@@ -35,19 +35,15 @@
 #include "runner/station/admission.h"
 #include "runner/station/opening.h"
 
-namespace palpate::runner::commands {
+// `palpate run`: a live session with a person and a device. Opens the station, runs the session in
+// a thread of its own beside the display's loop, and reports. The path to a force continues in
+// live_session.cpp, session.cpp (the trial loop), servo_thread.cpp, servo.cpp (the tick),
+// rendering.
 
-// The output of `palpate run` before and after a session.
+namespace palpate::runner::commands {
+namespace {
 
 /// \param simulated  whether the device is simulated
-void print_participant(const data::Participant& participant, int session, int sessions,
-                       bool simulated);
-/// \param elapsed  s, since the servo thread began
-void print_servo_health(const servo::ServoHealth& health, double elapsed);
-/// \param who  as stored now
-void print_outcome(const session::LiveStation& station, const data::Participant& who,
-                   const session::LiveSession::Outcome& outcome);
-
 void print_participant(const data::Participant& participant, int session, int sessions,
                        bool simulated) {
   std::printf("participant %s has number %d; session %d of %d\n", participant.code.c_str(),
@@ -64,6 +60,7 @@ void print_participant(const data::Participant& participant, int session, int se
   if (simulated) std::fprintf(stderr, "SIMULATED device: the data are labelled so\n");
 }
 
+/// \param elapsed  s, since the servo thread began
 void print_servo_health(const servo::ServoHealth& health, double elapsed) {
   std::fprintf(stderr,
                "servo: %llu ticks in %.3f s, %llu missed, longest period %.2f ms, lateness p99.9 "
@@ -74,6 +71,7 @@ void print_servo_health(const servo::ServoHealth& health, double elapsed) {
                static_cast<double>(health.lateness().quantile(0.999)) * 1e-3);
 }
 
+/// \param who  as stored now
 void print_outcome(const session::LiveStation& station, const data::Participant& who,
                    const session::LiveSession::Outcome& outcome) {
   const std::string number = who.id == 0 ? "not enrolled" : "number " + std::to_string(who.number);
@@ -86,13 +84,6 @@ void print_outcome(const session::LiveStation& station, const data::Participant&
   if (outcome.end == data::RunEnd::paused || outcome.end == data::RunEnd::aborted)
     std::fprintf(stderr, "the same command resumes from here\n");
 }
-
-// `palpate run`: a live session with a person and a device. Opens the station, runs the session in
-// a thread of its own beside the display's loop, and reports. The path to a force continues in
-// live_session.cpp, session.cpp (the trial loop), servo_thread.cpp, servo.cpp (the tick),
-// rendering.
-
-namespace {
 
 /// Facts known before the session, for its record or the console.
 struct Beforehand {

@@ -176,9 +176,8 @@ class FalconDevice final : public servo::Device {
   servo::DeviceCapabilities capabilities_;
 };
 
-// Two Falcons that hold the ends of a stylus, like the two Phantoms of Ho, Basdogan & Srinivasan
-// (2000), section 2: five degrees of freedom, sensed and actuated. World frame: the tip's device.
-
+/// Two Falcons that hold the ends of a stylus, like the two Phantoms of Ho, Basdogan & Srinivasan
+/// (2000), section 2: five degrees of freedom, sensed and actuated. World frame: the tip's device.
 class Falcon2Device final : public servo::Device {
  public:
   Falcon2Device(std::unique_ptr<FalconDriver> tip, std::unique_ptr<FalconDriver> tail,

@@ -292,6 +292,27 @@ Block random_block(Random& random, int cuts) {
   return block;
 }
 
+/// The polar dual of cut_cube: triangles, corners of any number of facets.
+stimuli::PolygonSoup polar_of_cut_cube(Random& random, int cuts) {
+  const Block block = random_block(random, cuts);
+  stimuli::PolygonSoup polar;
+  std::map<Index, std::vector<Index>> faces_at;
+  for (Index f = 0; f < block.planes.size(); ++f) {
+    polar.vertices.push_back(block.planes[f].normal * (0.25 / block.planes[f].offset));
+    for (const Index v : block.soup.faces[f]) faces_at[v].push_back(f);
+  }
+  for (const auto& [corner, faces] : faces_at) {
+    std::vector<Index> triangle = faces;  // three planes meet at every corner
+    const Vec3 &a = polar.vertices[triangle[0]], &b = polar.vertices[triangle[1]],
+               &c = polar.vertices[triangle[2]];
+    if (glm::dot(glm::cross(b - a, c - a), block.soup.vertices[corner]) < 0) {
+      std::swap(triangle[1], triangle[2]);
+    }
+    polar.faces.push_back(std::move(triangle));
+  }
+  return polar;
+}
+
 stimuli::PolygonSoup some_soup(Random& random) {
   const auto count = [&](std::uint64_t low, std::uint64_t high) {
     return static_cast<int>(low + random.below(high - low + 1));
@@ -354,26 +375,6 @@ std::vector<rendering::LineProbe> random_path(Random& random, PathKind kind,
 
 stimuli::PolygonSoup cut_cube(Random& random, int cuts) {
   return random_block(random, cuts).tidy();
-}
-
-stimuli::PolygonSoup polar_of_cut_cube(Random& random, int cuts) {
-  const Block block = random_block(random, cuts);
-  stimuli::PolygonSoup polar;
-  std::map<Index, std::vector<Index>> faces_at;
-  for (Index f = 0; f < block.planes.size(); ++f) {
-    polar.vertices.push_back(block.planes[f].normal * (0.25 / block.planes[f].offset));
-    for (const Index v : block.soup.faces[f]) faces_at[v].push_back(f);
-  }
-  for (const auto& [corner, faces] : faces_at) {
-    std::vector<Index> triangle = faces;  // three planes meet at every corner
-    const Vec3 &a = polar.vertices[triangle[0]], &b = polar.vertices[triangle[1]],
-               &c = polar.vertices[triangle[2]];
-    if (glm::dot(glm::cross(b - a, c - a), block.soup.vertices[corner]) < 0) {
-      std::swap(triangle[1], triangle[2]);
-    }
-    polar.faces.push_back(std::move(triangle));
-  }
-  return polar;
 }
 
 stimuli::PolygonSoup part_below(const stimuli::PolygonSoup& solid, const Vec3& normal,

@@ -51,9 +51,6 @@ std::vector<rendering::LineProbe> random_path(Random& random, PathKind kind,
 /// of any number of sides.
 stimuli::PolygonSoup cut_cube(Random& random, int cuts);
 
-/// The polar dual of cut_cube: triangles, corners of any number of facets.
-stimuli::PolygonSoup polar_of_cut_cube(Random& random, int cuts);
-
 /// Every corner's coordinates times these factors; convexity is kept.
 stimuli::PolygonSoup stretched(stimuli::PolygonSoup soup, const Vec3& factors);
 

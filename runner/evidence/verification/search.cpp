@@ -51,6 +51,15 @@ rendering::LineProbe interpolated(const rendering::LineProbe& a, const rendering
   return {a.tip + t * (b.tip - a.tip), a.tail + t * (b.tail - a.tail)};
 }
 
+/// The part of the probe that can touch, in the frame of the part's mesh: for the point renderer
+/// the tip alone.
+rendering::LineProbe felt_probe(const rendering::Scene& scene, const rendering::Renderer& renderer,
+                                const rendering::LineProbe& probe) {
+  const rendering::ScenePart& part = scene.parts()[0];
+  const Vec3 tip = part.local_point(probe.tip);
+  return {tip, renderer.side_contact() ? part.local_point(probe.tail) : tip};
+}
+
 /// One walk in progress.
 class Walk {
  public:
@@ -353,6 +362,41 @@ double distance_to_segment(const Vec3& p, const Vec3& a, const Vec3& b) {
   return glm::length(p - a - t * ab);
 }
 
+/// Whether all numbers of a rendering are finite.
+bool all_finite(const rendering::Rendering& r) {
+  return finite(r.force) && finite(r.torque) && finite(r.device1) && finite(r.device2) &&
+         finite(r.deepest.point) && finite(r.deepest.normal) && std::isfinite(r.deepest.depth) &&
+         std::isfinite(r.deepest.along) && finite(r.ideal.tip) && finite(r.ideal.tail) &&
+         finite(r.ideal_side);
+}
+
+/// The scene of a walk: one object of this stiffness, N/m.
+rendering::Scene union_scene(const UnionWalk& walk, double stiffness) {
+  std::vector<rendering::SceneObject> objects;
+  for (const OraclePart& part : walk.parts) {
+    rendering::SceneObject object;
+    object.mesh = part.mesh;
+    object.pose = part.pose;
+    object.material.stiffness = stiffness;
+    objects.push_back(std::move(object));
+  }
+  rendering::Tool tool;
+  if (!is_plain(walk.tool)) {
+    for (const OracleSegment& segment : walk.tool) {
+      tool.segments.push_back({segment.from, segment.to});
+    }
+  }
+  return rendering::Scene(std::move(objects), true, std::move(tool));
+}
+
+/// The stylus of a walk at a pose; `state` gets the tool's +x as measured.
+rendering::LineProbe union_probe(const UnionWalk& walk, const OraclePose& pose,
+                                 rendering::RenderState& state) {
+  state.measured_side = pose.axes[0];
+  if (is_plain(walk.tool)) return {pose.place(walk.tool[0].from), pose.place(walk.tool[0].to)};
+  return {pose.tip, pose.place(Vec3(0, 0, kStylus))};
+}
+
 /// One walk in progress.
 class UnionWalker {
  public:
@@ -512,20 +556,6 @@ class UnionWalker {
 
 }  // namespace
 
-bool all_finite(const rendering::Rendering& r) {
-  return finite(r.force) && finite(r.torque) && finite(r.device1) && finite(r.device2) &&
-         finite(r.deepest.point) && finite(r.deepest.normal) && std::isfinite(r.deepest.depth) &&
-         std::isfinite(r.deepest.along) && finite(r.ideal.tip) && finite(r.ideal.tail) &&
-         finite(r.ideal_side);
-}
-
-rendering::LineProbe felt_probe(const rendering::Scene& scene, const rendering::Renderer& renderer,
-                                const rendering::LineProbe& probe) {
-  const rendering::ScenePart& part = scene.parts()[0];
-  const Vec3 tip = part.local_point(probe.tip);
-  return {tip, renderer.side_contact() ? part.local_point(probe.tail) : tip};
-}
-
 TickAudit audit_tick(const rendering::Scene& scene, const rendering::Renderer& renderer,
                      const rendering::LineProbe& probe, const rendering::Rendering& r,
                      double rounding) {
@@ -654,31 +684,6 @@ UnionWalk grid_walk(std::span<const std::uint8_t> data, std::size_t most_ticks) 
     }
   }
   return walk;
-}
-
-rendering::Scene union_scene(const UnionWalk& walk, double stiffness) {
-  std::vector<rendering::SceneObject> objects;
-  for (const OraclePart& part : walk.parts) {
-    rendering::SceneObject object;
-    object.mesh = part.mesh;
-    object.pose = part.pose;
-    object.material.stiffness = stiffness;
-    objects.push_back(std::move(object));
-  }
-  rendering::Tool tool;
-  if (!is_plain(walk.tool)) {
-    for (const OracleSegment& segment : walk.tool) {
-      tool.segments.push_back({segment.from, segment.to});
-    }
-  }
-  return rendering::Scene(std::move(objects), true, std::move(tool));
-}
-
-rendering::LineProbe union_probe(const UnionWalk& walk, const OraclePose& pose,
-                                 rendering::RenderState& state) {
-  state.measured_side = pose.axes[0];
-  if (is_plain(walk.tool)) return {pose.place(walk.tool[0].from), pose.place(walk.tool[0].to)};
-  return {pose.tip, pose.place(Vec3(0, 0, kStylus))};
 }
 
 bool is_plain(const OracleTool& tool) { return tool.size() == 1; }

@@ -18,14 +18,6 @@ namespace palpate::runner::evidence {
 // Errors of one tick of a renderer over a scene of one convex part, against the brute-force
 // reference. For checks, not for the servo.
 
-/// Whether all numbers of a rendering are finite.
-bool all_finite(const rendering::Rendering& r);
-
-/// The part of the probe that can touch, in the frame of the part's mesh: for the point renderer
-/// the tip alone.
-rendering::LineProbe felt_probe(const rendering::Scene& scene, const rendering::Renderer& renderer,
-                                const rendering::LineProbe& probe);
-
 /// Errors of one tick, each 0 in a correct tick. Lengths in m.
 struct TickAudit {
   double depth = 0;       ///< of the virtual probe by the reference; negative: outside
@@ -138,11 +130,6 @@ UnionWalk random_union_walk(std::uint64_t seed, std::uint64_t walk, std::size_t 
 /// can coincide does.
 UnionWalk grid_walk(std::span<const std::uint8_t> bytes, std::size_t most_ticks);
 
-/// The scene of a walk: one object of this stiffness, N/m.
-rendering::Scene union_scene(const UnionWalk& walk, double stiffness);
-/// The stylus of a walk at a pose; `state` gets the tool's +x as measured.
-rendering::LineProbe union_probe(const UnionWalk& walk, const OraclePose& pose,
-                                 rendering::RenderState& state);
 /// Whether a tool is just the stylus.
 bool is_plain(const OracleTool& tool);
 

@@ -36,7 +36,7 @@ TEST(LabelPlaces, TheNearerLabelStaysAndTheOtherMoves) {
   EXPECT_LT(std::abs(boxes[1].centre.y - 100), 35) << "not far from what it names";
 }
 
-TEST(LabelPlaces, AtTheBorderLabelsMoveInAndFarOutsideTheyAreHidden) {
+TEST(LabelPlaces, LabelsStayInsideTheBorder) {
   std::vector<LabelBox> boxes{{{5, 3}, {60, 14}, 1},
                               {{636, 200}, {60, 14}, 2},
                               {{-80, 200}, {60, 14}, 3},

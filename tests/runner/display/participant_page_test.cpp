@@ -83,7 +83,7 @@ TEST(ParticipantPage, ATrialShowsItsWordAndTheKeyMap) {
   EXPECT_EQ(inked_rows(draw_page(page, 1280, 800)), 0);
 }
 
-TEST(ParticipantPage, ALongTextContinuesOnTheNextScreenInTheSameSize) {
+TEST(ParticipantPage, LongTextsContinueInTheSameSize) {
   Page page;
   page.kind = Page::Kind::text;
   for (int i = 0; i < 300; ++i) page.text += "Halten Sie den Griffel wie einen Stift. ";

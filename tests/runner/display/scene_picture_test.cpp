@@ -107,7 +107,7 @@ TEST_F(ScenePictureTest, AnObjectIsSeenWhereItIsProjected) {
   EXPECT_TRUE(bluish(seen({0.05, 0, 0}))) << "moved with the camera";
 }
 
-TEST_F(ScenePictureTest, AForceIsDrawnAsAnArrowAndZeroForceIsNot) {
+TEST_F(ScenePictureTest, OnlyNonzeroForcesHaveArrows) {
   const SceneDrawing drawing({ball({0, 0, 0}, 0.03)}, {});
   draw(drawing.picture(away(), light_theme(), {}));
   EXPECT_EQ(count(reddish), 0);

@@ -55,7 +55,7 @@ class TextScreens : public ::testing::Test {
   TextConsole console_{out_, wake_};
 };
 
-TEST_F(TextScreens, ATextToReadNamesTheKeyToContinueAndItsLength) {
+TEST_F(TextScreens, TextsNameTheirKeyAndLength) {
   EXPECT_EQ(page(of_kind(Page::Kind::text, "Hello")), "Hello\n[space bar: go on]\n");
   Page second = of_kind(Page::Kind::text, "More");
   second.part = 2;

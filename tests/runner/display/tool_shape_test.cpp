@@ -35,7 +35,7 @@ TEST(ToolShape, BeforeATrialHasTheInitialRollOfATrial) {
   expect_near(drawn.segments[1].tail, sample.probe.tip + frame * kHook.segments[1].to);
 }
 
-TEST(ToolShape, InContactTheIdealToolRestsOnTheObjectAndTheHandsIsInside) {
+TEST(ToolShape, IdealToolRestsOnTheObject) {
   rendering::SceneObject cube;
   cube.mesh = std::make_shared<const stimuli::ConvexMesh>(stimuli::cube(0.06));
   const rendering::Scene scene({cube}, true, kHook);

@@ -154,7 +154,7 @@ class PointerOnScreenTest : public UprightPictureTest {
   SceneDrawing drawing_ = one_ball({0, 0, 0});
 };
 
-TEST_F(PointerOnScreenTest, ThePointerUpMovesTheStylusUpAndRightMovesItRight) {
+TEST_F(PointerOnScreenTest, StylusFollowsThePointer) {
   for (const float yaw : {-2.2F, 0.0F, 0.5F, 1.6F}) {
     for (const float pitch : {0.0F, 0.4F, 1.0F}) {
       camera_.look_from(yaw, pitch);

@@ -89,7 +89,7 @@ TEST(Explorer, InVersion1PressesOnAfterALossOfContact) {
   EXPECT_LT(glm::length(at.target.velocity / 0.06 - expected), 1e-9);
 }
 
-TEST(Explorer, InVersion2TurnsToTheCentreAfterALossOfContact) {
+TEST(Explorer, Version2TurnsBackAfterLostContact) {
   const SimulatedSettings settings = quick_hand(2);
   const AfterLossOfContact at(settings);
   const Vec3 way = at.target.velocity / settings.motor.slide_speed;

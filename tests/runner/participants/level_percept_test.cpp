@@ -225,7 +225,7 @@ TEST(LevelPercept, EqualFormsHaveTheSameShapeSizesAndPlace) {
   EXPECT_FALSE(differs([](Spec& o) { o.parts[0].material.stiffness *= 2; }));
 }
 
-TEST(LevelPercept, StimuliDifferInStiffnessOnlyIfFormsAreEqualAndStiffnessesDistinct) {
+TEST(LevelPercept, StiffnessPerceptNeedsEqualForms) {
   const std::string ball = R"("shape": "sphere", "radius_m": 0.03, "stiffness_n_per_m": )";
   const auto alone = [&](const std::vector<std::string>& stimuli) {
     protocols::Protocol protocol = study(stimuli, "/stiffness_n_per_m", "200, 300");

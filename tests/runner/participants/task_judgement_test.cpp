@@ -137,7 +137,7 @@ TEST(TaskJudgement, NumbersScatterLogNormally) {
   EXPECT_NEAR(sd, 0.2, 4 * 0.2 / std::sqrt(2.0 * kDraws));
 }
 
-TEST(TaskJudgement, AStepOfAScaleIsTheNearestToTheLevelsPlace) {
+TEST(TaskJudgement, ScaleStepsAreNearestToTheLevel) {
   Judge judge(R"("task": "rate", "scale": [{"label": "a"}, {"label": "b"}, {"label": "c"},
                  {"label": "d"}, {"label": "e"}], )" +
                   constant("100, 500"),

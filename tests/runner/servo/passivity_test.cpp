@@ -74,7 +74,7 @@ TEST(Passivity, NeverPushesAlongTheMotion) {
   EXPECT_GT(acted, 1000);
 }
 
-TEST(Passivity, DoesNotDampAConstantForceOrASlideAlongAFace) {
+TEST(Passivity, LeavesConstantForcesAndSlidesUndamped) {
   PassivityController control({}, kTick);
   const DeviceForces weight{Vec3(0, 0, -1), Vec3(0, 0, 2), false};
   for (int i = 0; i < 1000; ++i) {
@@ -93,7 +93,7 @@ TEST(Passivity, DoesNotDampAConstantForceOrASlideAlongAFace) {
   }
 }
 
-TEST(Passivity, StartsANewAccountAtResetAndAfterPosesThatAreNotFinite) {
+TEST(Passivity, ResetsItsAccount) {
   PassivityController control({}, kTick);
   const DeviceForces scene{Vec3(0, 0, 3), Vec3(0), false};
   (void)control.damping({Vec3(0), Vec3(0)}, {});

@@ -30,7 +30,7 @@ DeviceReading come_down(int tick, double floor) {
   return stylus_at(tick < 600 ? 0.1 : std::max(floor, 0.1 - 1e-4 * (tick - 600)));
 }
 
-TEST(Servo, ForcesGoOnAfterTheRestInTheHomeZoneAndShowTheWall) {
+TEST(Servo, ForcesBeginAfterARestAtHome) {
   FakeDevice device([](int tick) { return come_down(tick, 0.029); });
   VirtualClock clock;
   Servo servo(device, clock, 1000, ForceLimits{});
@@ -105,7 +105,7 @@ TEST(Servo, NoForceBeforeTheStylusHasRested) {
   for (int tick = 0; tick < 5000; ++tick) ASSERT_EQ(other.tick().phase, Phase::homing);
 }
 
-TEST(Servo, ForceIsLimitedInSizeAndChangeAndRampedAndBothForcesAreOnRecord) {
+TEST(Servo, LimitsRampsAndRecordsForce) {
   for (const double device_limit : {8.0, 2.0}) {
     // 20 mm into the cube: 16 N rendered.
     FakeDevice device([](int tick) { return come_down(tick, 0.01); });
@@ -251,7 +251,7 @@ class StallingClock final : public Clock {
   std::int64_t now_ = 0, at_, for_;
 };
 
-TEST(Servo, MissedTicksAreCountedAndFiveInARowEndTheForce) {
+TEST(Servo, FiveMissedTicksEndTheForce) {
   for (const int missed : {1, 4, 5, 50}) {
     FakeDevice device([](int tick) { return come_down(tick, 0.029); });
     StallingClock clock(2'000'000'000, missed * 1'000'000);
@@ -267,7 +267,7 @@ TEST(Servo, MissedTicksAreCountedAndFiveInARowEndTheForce) {
   }
 }
 
-TEST(Servo, ADeviceWithThreeDrivenAxesGetsTheTotalForceWithinItsLimit) {
+TEST(Servo, LimitsTheTotalForceOfThreeAxes) {
   // The stylus lies on the cube's upper face, centred: each end gets half.
   const auto lie_down = [](double floor) {
     return [floor](int tick) {
@@ -302,7 +302,7 @@ TEST(Servo, ADeviceWithThreeDrivenAxesGetsTheTotalForceWithinItsLimit) {
   }
 }
 
-TEST(Servo, AGripWithTorqueGetsForceAndTorqueScaledTogetherWithinItsLimits) {
+TEST(Servo, ScalesForceAndTorqueTogether) {
   for (const double middle : {-0.05, 0.0, 0.05}) {  // of the stylus beside that of the face, m
     const auto lie_down = [middle](int tick) {
       const double z = tick < 600 ? 0.1 : std::max(0.01, 0.1 - 1e-4 * (tick - 600));
@@ -418,7 +418,7 @@ TEST(Servo, TheWholeToolMustBeInTheHomeZone) {
   EXPECT_EQ(first_force(hook, 0.112), 499);
 }
 
-TEST(Servo, ANanStylusWithAToolIsNotInTheHomeZone) {
+TEST(Servo, NanStylusIsNotAtHome) {
   rendering::Tool one{{{{0, 0, 0}, {0, 0, 0.12}}}}, two = one;
   two.segments.push_back({{0, 0, 0}, {0.01, 0, 0.02}});
   const rendering::LineProbe far{{0, 0, 0.5}, {0, 0, 0.62}};

@@ -67,7 +67,7 @@ bool equal(const Rendering& a, const Rendering& b) {
          a.faults == b.faults && a.contacts == b.contacts && a.deepest.depth == b.deepest.depth;
 }
 
-TEST(SoftThreads, APathGivesTheSameForcesWithoutThreadsIfLateTicksAreKnown) {
+TEST(SoftThreads, ReplaysWithoutThreads) {
   const rendering::Scene scene = soft_cubes(2);
   SoftThreads threads(scene, kPlainThread);
   ASSERT_EQ(threads.size(), 2U);

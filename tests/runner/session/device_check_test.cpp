@@ -52,7 +52,7 @@ double share(const stimuli::Material& material, const servo::DeviceCapabilities&
   return showable(material, device, rate, scale, controlled).fraction;
 }
 
-TEST(DeviceCheck, ARendererWithTorqueNeedsADeviceWithTorqueOrAProtocolThatOmitsIt) {
+TEST(DeviceCheck, TorqueNeedsADeviceOrItsOmission) {
   for (const int driven : {0, 3, 5}) {
     for (const bool ray : {false, true}) {
       for (const bool left_out : {false, true}) {

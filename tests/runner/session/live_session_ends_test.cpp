@@ -83,7 +83,7 @@ TEST_F(LiveSessions, AnEndDuringTheFeedbackKeepsTheAnswer) {
   EXPECT_EQ(records().size(), 1u);
 }
 
-TEST_F(LiveSessions, AWithdrawalOnTheLastPageOrRightAfterAnotherEndCounts) {
+TEST_F(LiveSessions, LateWithdrawalsCount) {
   protocol_.texts.end = "that was all";
   FakeDevice device([](int) { return at(0.1); });
   screen_.takes_ns = 80'000'000;

@@ -14,7 +14,7 @@ using runner::testing::FakeDevice;
 using testing::at;
 using testing::LiveSessions;
 
-TEST_F(LiveSessions, ALostDeviceCutsTheTrialOffAndItIsShownAgainOnceCleared) {
+TEST_F(LiveSessions, RepeatsATrialThatALostDeviceCutOff) {
   std::atomic<bool> plugged{true};
   FakeDevice device([&](int tick) {
     if (tick == 30) plugged = false;  // in the first trial
@@ -93,7 +93,7 @@ TEST_F(LiveSessions, AFaultNamesItsReasonAndTheNextStep) {
             "then 'on'");
 }
 
-TEST_F(LiveSessions, ALateGuardPausesTheSessionAndAnEndedOneEndsIt) {
+TEST_F(LiveSessions, LateGuardsPauseAndEndedOnesEnd) {
   std::atomic<servo::DeviceTrouble> trouble{servo::DeviceTrouble::none};
   FakeDevice device([&](int tick) {
     if (tick == 30) trouble = servo::DeviceTrouble::guard_late;
@@ -145,7 +145,7 @@ class Headphones final : public sound::SoundOutput {
  private:
   const Plugged plugged_;
 };
-TEST_F(LiveSessions, HeadphonesPulledOutInATrialCutItOffAndPauseUntilTheyAreBack) {
+TEST_F(LiveSessions, LostHeadphonesCutOffTheTrialAndPause) {
   const Plugged plugged = std::make_shared<std::atomic<bool>>(true);
   noise_ = std::make_unique<sound::NoisePlayer>(
       protocols::MaskingNoise{}, 1, "headphones",

@@ -59,7 +59,7 @@ TEST_F(LiveSessions, EveryTrialAsksForTheSameDistanceWhateverItsShape) {
     EXPECT_EQ(said, (std::set<std::string>{texts.move_away, texts.ready, texts.go}));
 }
 
-TEST_F(LiveSessions, AKeyThatDoesNothingGetsAReplyAndAFaultAsksToWait) {
+TEST_F(LiveSessions, UnusedKeysGetAReply) {
   std::atomic<bool> plugged{true};
   FakeDevice device([&](int) { return at(0.1, !plugged); });
   screen_.answers = false;

@@ -96,7 +96,7 @@ class ParallelMarkers : public testing::Test {
   FakePort fake_;
 };
 
-TEST_F(ParallelMarkers, EachIsAPulseAndTheNextWaitsForItsEnd) {
+TEST_F(ParallelMarkers, PulsesWaitForEachOther) {
   {
     const auto sink = open_marker_sink("parport:" + path_ + ":20", MarkerCodes::this_computer);
     for (const Kind kind : {Kind::trial_start, Kind::first_contact, Kind::response})

@@ -127,7 +127,7 @@ TEST(Preflight, ThePushIsAnnouncedGivenAndConfirmed) {
             std::string::npos);
 }
 
-TEST(Preflight, ADeviceThatIsLostWhileItPushesIsHomedAndPushesAgain) {
+TEST(Preflight, HomesADeviceLostDuringThePush) {
   const ForceDirectionCheck push({6, 0.5, 0.2}, 3);
   PreflightNeeds needs{0, 0};
   needs.push = &push;

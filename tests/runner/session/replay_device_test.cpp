@@ -24,7 +24,7 @@ std::vector<data::SampleRecord> three_samples() {
   return samples;
 }
 
-TEST(ReplayDevice, GivesTipTailAndButtonsInOrderAndThenIsLost) {
+TEST(ReplayDevice, GivesSamplesInOrderAndThenIsLost) {
   const auto samples = three_samples();
   ReplayDevice device(samples, 1000);
   for (std::size_t i = 0; i < samples.size(); ++i) {

@@ -37,7 +37,7 @@ TEST(Session, RunsPracticeBlocksBreaksAndEnd) {
   EXPECT_GE(bench.log.finished[4].onset_ns - bench.log.finished[3].response_ns, 20'000'000'000);
 }
 
-TEST(Session, ABreakIsDueAfterItsNumberOfTrialsOfTheBlock) {
+TEST(Session, BreaksAreDueAfterTheirTrials) {
   SessionBench bench;
   bench.protocol.blocks_per_renderer = 1;
   bench.protocol.repetitions = 4;  // 2 of practice, then 8 for each renderer
@@ -85,7 +85,7 @@ TEST(Session, PracticeIsRepeatedUntilTheCriterionOrTheLastRound) {
   }
 }
 
-TEST(Session, ResumesAtTheFirstTrialWithoutARecordWhereverItStopped) {
+TEST(Session, ResumesAtTheFirstUnrecordedTrial) {
   const std::deque<int> script = {0, 1, 1, 1, 0, -1, 1, 0};
   SessionBench whole;
   ScriptedRespondent respondent(script);
@@ -130,7 +130,7 @@ TEST(Session, AFaultCutsTheTrialOffWithZeroForce) {
 }
 
 // A live session's trial in the store: begun on disk, cut off by a fault, repeated.
-TEST(Session, ACutOffTrialIsShownAgainAndBothAttemptsAreOnRecord) {
+TEST(Session, RecordsBothAttemptsOfACutOffTrial) {
   const palpate::testing::TemporaryFolder folder;
   {
     SessionBench bench;

@@ -72,7 +72,7 @@ TEST_F(SimulatedSolids, LayersAreFeltAtTheirDepths) {
 
 // Approaches begin outside the cube's home zone: it begins 62 mm from the centre, those of the
 // other shapes at most at 53 mm.
-TEST_F(SimulatedSolids, ATrialThatCannotBeginEndsTheStudyAndKeepsItsData) {
+TEST_F(SimulatedSolids, KeepsDataWhenATrialCannotBegin) {
   const protocols::Protocol protocol =
       protocols::parse_protocol(PALPATE_SOURCE_DIR "/protocols/quick.json");
   std::ofstream(folder_ / "near.json") << R"({"motor": {"approach_distance_m": 0.06}})";

@@ -238,7 +238,7 @@ TEST_F(SimulatedStudy, KeepsSamplesWhenAsked) {
 }
 
 // With a stylus that reaches five times its length.
-TEST_F(SimulatedStudy, ExploresAnObjectHalfAMetreAwayAndReplaysItToTheBit) {
+TEST_F(SimulatedStudy, ReplaysADistantObjectToTheBit) {
   protocols::Protocol p = protocol(
       R"(, "samples": true, "reach": {"factor": 5, "pivot": "tail"},
       "stylus": {"length_m": 0.1, "grip_m": 0.05}, "workspace": {"centre_m": [0, 0.45, 0]},

@@ -76,7 +76,7 @@ TEST(NoiseSignal, HasTheRequestedLevel) {
   }
 }
 
-TEST(NoiseSignal, PinkFallsByThreeDecibelAnOctaveAndWhiteByNone) {
+TEST(NoiseSignal, PinkFallsByThreeDecibelAnOctave) {
   for (const protocols::NoiseKind kind :
        {protocols::NoiseKind::white, protocols::NoiseKind::pink}) {
     const std::vector<double> samples = noise(kind, -20, 12);

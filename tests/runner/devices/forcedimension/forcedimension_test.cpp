@@ -39,7 +39,7 @@ void expect_near(const Vec3& a, const Vec3& b) {
       << a.x << " " << a.y << " " << a.z << ", not " << b.x << " " << b.y << " " << b.z;
 }
 
-TEST_F(ForceDimension, AStylusIsReadInTheWorldFrameAndItsForcesAddUpAtTheGrip) {
+TEST_F(ForceDimension, ReadsTheStylusAndAddsForcesAtItsGrip) {
   one().hand[0] = 0.01;  // towards the user
   one().hand[1] = 0.02;  // right
   one().hand[2] = 0.03;  // up
@@ -72,7 +72,7 @@ TEST_F(ForceDimension, WithoutAWristTheStylusIsAPoint) {
   EXPECT_EQ(reading.stylus.tip, reading.stylus.tail);
 }
 
-TEST_F(ForceDimension, ADrivenWristGetsTheTorqueOfTheTailsForceAboutTheTip) {
+TEST_F(ForceDimension, DrivenWristsGetTheTailsTorque) {
   one().model = 2;
   const auto device = open(config_);
   EXPECT_EQ(device->capabilities().actuated_freedom, 5);
@@ -217,7 +217,7 @@ TEST_F(ForceDimension, WhatCannotBeOpenedSaysWhy) {
   EXPECT_THROW(check(config_), std::invalid_argument);
 }
 
-TEST_F(ForceDimension, TheArmMovesByItselfOnlyIfItMustBeCalibratedAndEndsWithoutForce) {
+TEST_F(ForceDimension, MovesByItselfOnlyToCalibrate) {
   one().reset = 1;
   EXPECT_EQ(move_to_calibrate(config_), "omega.6, serial number 4711: is calibrated");
   EXPECT_EQ(one().moved, 1);
@@ -229,7 +229,7 @@ TEST_F(ForceDimension, TheArmMovesByItselfOnlyIfItMustBeCalibratedAndEndsWithout
   EXPECT_EQ(one().moved, 1);
 }
 
-TEST_F(ForceDimension, AnArmThatCannotBeCalibratedSaysWhyAndEndsWithoutForce) {
+TEST_F(ForceDimension, UncalibratedArmsEndWithoutForce) {
   const auto refused = [this] {
     try {
       return "it is said: " + move_to_calibrate(config_);

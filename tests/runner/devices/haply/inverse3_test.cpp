@@ -154,7 +154,7 @@ class Inverse3 : public ::testing::Test {
   servo::DeviceConfig config_;
 };
 
-TEST_F(Inverse3, AStylusIsReadAndItsForcesAddUpAtTheCursor) {
+TEST_F(Inverse3, ReadsTheStylusAndAddsForcesAtTheCursor) {
   service_.with([](EmulatedArm& arm) {
     arm.hand = {0.01, 0.02, 0.03};
     arm.hand_stiffness = 0;
@@ -284,7 +284,7 @@ TEST_F(Inverse3, AServiceThatEndsAndComesBackIsOpenedAgain) {
                     {1, 0, 0}));
 }
 
-TEST_F(Inverse3, AForceThatTheServiceIgnoresIsRetriedInTheOtherDialect) {
+TEST_F(Inverse3, RetriesIgnoredForcesInTheOtherDialect) {
   service_.with([](EmulatedArm& arm) { arm.vector = false; });  // although it is 3.5
   const auto device = open(config_);
   ASSERT_TRUE(works(*device));

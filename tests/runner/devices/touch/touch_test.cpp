@@ -49,7 +49,7 @@ class Touch : public testing::StubbedDevice {
   }
 };
 
-TEST_F(Touch, AStylusIsReadInTheWorldFrameAndItsForcesAddUpAtTheTip) {
+TEST_F(Touch, ReadsTheStylusAndAddsForcesAtItsTip) {
   one().hand[0] = 0.01;  // right
   one().hand[1] = 0.03;  // up
   one().hand[2] = 0.02;  // towards the user

@@ -165,7 +165,7 @@ TEST(BodyCases, ErrorsAtRestAreInMillimetres) {
   }
 }
 
-TEST(BodyStudy, HasARowForEachCaseAndEngineAndOursKeepsTheClosedForms) {
+TEST(BodyStudy, OurEngineKeepsTheClosedForms) {
   double clock = 0;
   std::vector<double> progress;
   const auto rows = body_study(

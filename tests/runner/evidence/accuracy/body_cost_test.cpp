@@ -10,7 +10,7 @@ namespace palpate::runner::evidence {
 namespace {
 namespace body_costs {
 
-TEST(BodyTickCost, IsTheMedianThe99thPercentileAndTheMostOfItsTicks) {
+TEST(BodyTickCost, GivesMedianP99AndWorst) {
   // Ticks take 1, 2, ... 2000 us, in another order; the work between them takes longer.
   double clock = 0;
   std::size_t looks = 0;

@@ -206,7 +206,7 @@ TEST(LocalDepths, OfAPolyhedronTheLeastIsTheReference) {
   }
 }
 
-TEST(LocalDepths, OfCubesAndBoxesThePolyhedronAndTheAnalyticShapeAgree) {
+TEST(LocalDepths, PolyhedronAgreesWithTheAnalyticBox) {
   for (const stimuli::ShapeKind shape : {stimuli::ShapeKind::cube, stimuli::ShapeKind::box}) {
     const stimuli::ObjectSpec spec = primitive(shape);
     const stimuli::ConvexMesh mesh(stimuli::polygons_of(spec));

@@ -54,7 +54,7 @@ TEST(PaperFirstContact, APolygonIsCrossedByAPoint) {
                                    {Vec3(0, 0, 1.1), Vec3(0, 0, 2)}));
 }
 
-TEST(PaperFirstContact, IsMostlyRightForASlowHandAndLosesContactsForAFastOne) {
+TEST(PaperFirstContact, LosesContactsOfFastHands) {
   const stimuli::ConvexMesh mesh(stimuli::cylinder(0.03, 0.06, 64));
   const FirstContactLoss slow = first_contact_loss(mesh, 0.1, 0, 300, 1);
   EXPECT_EQ(slow.entries, 300);

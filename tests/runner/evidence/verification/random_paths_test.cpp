@@ -69,7 +69,7 @@ TEST(RandomPaths, KeepLengthTicksAndPlaceAndComeBackToEachSeed) {
   }
 }
 
-TEST(RandomPaths, ASmoothHandMovesByLessThanAFewHundredthsOfTheSizeATickAndJumpsByMore) {
+TEST(RandomPaths, SmoothHandsTakeSmallSteps) {
   const stimuli::ConvexMesh cube(stimuli::cube(0.05));
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const double smooth = median_step(path_of(PathKind::smooth, cube, false, seed));

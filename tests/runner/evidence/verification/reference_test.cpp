@@ -39,7 +39,7 @@ TEST(ReferenceDepth, EndOfAStickCountsFromTheDeeperEnd) {
   expect_near(reference_depth(mesh, standing).normal, Vec3(0, 0, 1), 1e-15);
 }
 
-TEST(ReferenceDepth, StickAcrossAnEdgeIsPushedOutAtRightAnglesToBoth) {
+TEST(ReferenceDepth, EdgesPushSticksOutAtRightAngles) {
   const stimuli::ConvexMesh mesh = cube_of_two();
   const Vec3 out = glm::normalize(Vec3(1, 0, 1));
   const Vec3 middle = Vec3(1, 0.3, 1) - 0.1 * out;

@@ -61,7 +61,7 @@ Ticks stroked(const SurfaceStrokeSettings& settings, int ticks) {
   return out;
 }
 
-TEST(SurfaceStroke, GoesATenthOfAMillimetreATickOneToTwoDeep) {
+TEST(SurfaceStroke, KeepsItsPaceAndDepth) {
   for (const std::uint64_t seed : {1, 2, 3}) {
     for (const bool side : {false, true}) {
       SurfaceStrokeSettings settings;

@@ -62,7 +62,7 @@ TEST(UnionSearch, PartsCloserThanTheSkinAreNotEntered) {
   EXPECT_EQ(search_union(rendering::ray_renderer(), 1, 60).capped, 0u);
 }
 
-TEST(UnionSearch, AGapNarrowerThanTwoSkinsIsNeitherEnteredNorALimit) {
+TEST(UnionSearch, NarrowGapsAreNotEntered) {
   // In the first walk, turning closes a wedge between two parts to less than two skins; then the
   // tool moves along it. In the other, a slit of 0.17 skins has a second facet on one side, 0.05
   // skins higher.
@@ -131,12 +131,12 @@ TEST(UnionSearch, AFacetLeftByLessThanTheSkinIsLeft) {
   expect_nothing_wrong(3, 2824);
 }
 
-TEST(UnionSearch, AToolOnACornerIsHeldByTheFacetItIsOn) {
+TEST(UnionSearch, FacetsHoldAToolOnACorner) {
   // Another segment's facet at that corner is nearly parallel.
   expect_nothing_wrong(1, 3071);
 }
 
-TEST(UnionSearch, AContactAlongTheBorderOfAFaceIsOnTheFace) {
+TEST(UnionSearch, BorderContactsAreOnTheFace) {
   expect_nothing_wrong(1, 276);
   expect_nothing_wrong(1, 5394);
   expect_nothing_wrong(1, 5500);
