@@ -52,6 +52,26 @@ void read_columns(const nlohmann::json& page, std::vector<StoredColumn>& to) {
   }
 }
 
+GroupAssignment read_groups(const nlohmann::json& protocol) {
+  using Rule = GroupAssignment::Rule;
+  GroupAssignment out;
+  const auto groups = protocol.find("groups");
+  if (groups == protocol.end()) return out;
+  read_texts(*groups, "names", out.names);
+  std::string rule;
+  read_text(*groups, "assign", rule);
+  for (const Rule one : {Rule::blocked, Rule::given}) {
+    if (rule == to_string(one)) out.rule = one;
+  }
+  if (!out.any()) return out;
+  if (const auto block = groups->find("block");
+      block != groups->end() && block->is_number_integer())
+    out.block = std::max(1, block->get<int>());
+  if (const auto seed = protocol.find("seed"); seed != protocol.end() && seed->is_number_unsigned())
+    out.seed = *seed;
+  return out;
+}
+
 }  // namespace
 
 StoredProtocol read_stored_protocol(const std::string& text) {
@@ -70,6 +90,7 @@ StoredProtocol read_stored_protocol(const std::string& text) {
     if (!name.empty()) out.stimuli.push_back(name);
   }
   for (const auto& page : list_of(json, "pages")) read_columns(page, out.columns);
+  out.groups = read_groups(json);
   std::vector<std::string> renderers;
   read_texts(json, "renderers", renderers);
   for (const auto& one : list_of(json, "blocks")) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "data/base/group_assignment.h"
 #include "data/record.h"
 
 namespace palpate::data {
@@ -30,6 +31,7 @@ struct StoredProtocol {
   int repetitions = 0;                ///< of a protocol without blocks
   std::vector<StoredBlock> blocks;    ///< empty: version 1
   std::vector<StoredColumn> columns;  ///< of participants
+  GroupAssignment groups;             ///< of participants
 };
 
 StoredProtocol read_stored_protocol(const std::string& text);

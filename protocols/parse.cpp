@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <map>
+#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -11,6 +12,7 @@
 #include "data/base/checksum.h"
 #include "data/base/text.h"
 #include "protocols/answer_keys.h"
+#include "protocols/groups.h"
 #include "protocols/json_document.h"
 #include "protocols/parse_scene.h"
 #include "protocols/protocol.h"
@@ -375,6 +377,71 @@ void check_schedule(const Protocol& protocol, FaultList& faults) {
   }
 }
 
+/// \param patches  of the groups
+Protocol read_design(const json& root, const MeshFiles& files, FaultList& faults,
+                     std::vector<json>& patches) {
+  Protocol protocol;
+  ObjectReader reader(root, "", faults);
+  reader.member("$schema");
+  read_version(reader, protocol);
+  reader.name("name", protocol.name);
+  reader.text("title", protocol.title);
+  reader.text("description", protocol.description);
+  read_renderers(reader, protocol);
+  read_renderer_order(reader, protocol);
+  reader.section("material",
+                 [&](ObjectReader& section) { read_material(section, protocol.material); });
+  read_stimuli(reader, protocol, files);
+  if (protocol.version == 2) {
+    read_tasks(reader, protocol, files);
+    patches = read_groups(reader, protocol);
+  } else {
+    read_identification(reader, protocol);
+  }
+  read_apparatus(reader, protocol);
+  read_event_codes(reader, protocol);  // for their faults: a schedule needs none
+  check_radius(reader, protocol.tool,
+               std::any_of(protocol.stimuli.begin(), protocol.stimuli.end(),
+                           [](const auto& stimulus) { return stimulus.object.soft.has_value(); }));
+  reader.boolean("samples", protocol.samples);
+  reader.seed("seed", protocol.seed);
+  reader.refuse_unknown_keys();
+  protocol.groups.seed = protocol.seed;
+  if (faults.empty()) (protocol.version == 2 ? check_blocks : check_schedule)(protocol, faults);
+  return protocol;
+}
+
+/// \throws InputError with the faults of all groups
+void add_group_protocols(const json& root, const std::vector<json>& patches, const MeshFiles& files,
+                         const std::string& file_name, Protocol& protocol) {
+  std::vector<Fault> faults;
+  std::vector<std::shared_ptr<const Protocol>> all;
+  for (std::size_t i = 0; i < patches.size(); ++i) {
+    json patched = root;
+    patched.merge_patch(patches[i]);
+    patched.erase("groups");
+    FaultList own(file_name);
+    std::vector<json> none;
+    auto group = std::make_shared<Protocol>();
+    try {
+      *group = read_design(patched, files, own, none);
+      own.throw_if_any();
+    } catch (const InputError& error) {
+      for (Fault fault : error.faults()) {
+        fault.expected = "in group '" + protocol.groups.names[i] + "': " + fault.expected;
+        faults.push_back(std::move(fault));
+      }
+      continue;
+    }
+    group->groups = protocol.groups;
+    group->source_text = protocol.source_text;
+    group->sha256 = protocol.sha256;
+    all.push_back(std::move(group));
+  }
+  if (!faults.empty()) throw InputError(std::move(faults));
+  protocol.group_protocols = std::move(all);
+}
+
 }  // namespace
 
 InputError::InputError(std::vector<Fault> faults)
@@ -388,37 +455,13 @@ Protocol parse_protocol_text(const std::string& text, const std::string& file_na
                              const StoredFiles& stored, OtherFiles others) {
   FaultList faults(file_name);
   const json root = read_json(text, faults);
-  Protocol protocol;
-  ObjectReader reader(root, "", faults);
-  reader.member("$schema");
-  read_version(reader, protocol);
-  reader.name("name", protocol.name);
-  reader.text("title", protocol.title);
-  reader.text("description", protocol.description);
-  read_renderers(reader, protocol);
-  read_renderer_order(reader, protocol);
-  reader.section("material",
-                 [&](ObjectReader& section) { read_material(section, protocol.material); });
   const MeshFiles files{folder_of(file_name), stored, others};
-  read_stimuli(reader, protocol, files);
-  if (protocol.version == 2) {
-    read_tasks(reader, protocol, files);
-  } else {
-    read_identification(reader, protocol);
-  }
-  read_apparatus(reader, protocol);
-  read_event_codes(reader, protocol);  // for their faults: a schedule needs none
-  check_radius(reader, protocol.tool,
-               std::any_of(protocol.stimuli.begin(), protocol.stimuli.end(),
-                           [](const auto& stimulus) { return stimulus.object.soft.has_value(); }));
-  reader.boolean("samples", protocol.samples);
-  reader.seed("seed", protocol.seed);
-  reader.refuse_unknown_keys();
-  if (faults.empty()) (protocol.version == 2 ? check_blocks : check_schedule)(protocol, faults);
+  std::vector<json> patches;
+  Protocol protocol = read_design(root, files, faults, patches);
   faults.throw_if_any();
-
   protocol.source_text = text;
   protocol.sha256 = checksum_hex(text);
+  add_group_protocols(root, patches, files, file_name, protocol);
   return protocol;
 }
 

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "data/base/group_assignment.h"
 #include "protocols/procedures/procedure_spec.h"
 #include "stimuli/shapes.h"
 #include "stimuli/vec.h"
@@ -307,6 +308,10 @@ struct Protocol {
   bool blocks_counterbalanced = false;  ///< within a session; practice stays before its block
   std::vector<PageSpec> pages;
   std::vector<std::string> stimulus_texts;  ///< JSON of each stimulus, for its levels
+  GroupAssignment groups;                   ///< of participants
+  /// The protocol of each group, with what differs for it (groups.h). Empty: there are no groups,
+  /// or this is a group's own.
+  std::vector<std::shared_ptr<const Protocol>> group_protocols;
 
   std::string language;     ///< of a translation of its texts; "": not translated
   std::string translation;  ///< the file of the translation, byte for byte

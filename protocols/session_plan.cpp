@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "protocols/groups.h"
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/block_tracks.h"
 #include "protocols/tasks/block_trials.h"
@@ -41,15 +42,15 @@ std::vector<SessionPlan::Sequence> SessionPlan::sequences_of(const Protocol& pro
 }
 
 SessionPlan::SessionPlan(const Protocol& protocol, int participant_number, int session)
-    : protocol_(&protocol),
+    : protocol_(&protocol_of(protocol, participant_number)),
       participant_number_(participant_number),
       session_(session),
-      sequences_(sequences_of(protocol, participant_number, session)) {
+      sequences_(sequences_of(*protocol_, participant_number, session)) {
   if (!sequences_.empty() && !sequence().trials.empty()) {
     first_block_ = sequence().trials.front().block;
   } else {
     first_block_ += static_cast<int>(std::ranges::count_if(
-        protocol.blocks, [session](const TaskBlock& block) { return block.session < session; }));
+        protocol_->blocks, [session](const TaskBlock& block) { return block.session < session; }));
   }
   if (!sequences_.empty()) begin_sequence();
   find_next();

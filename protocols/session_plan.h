@@ -36,7 +36,7 @@ struct TrialChoice {
 
 class SessionPlan {
  public:
-  /// \param protocol  must outlive it
+  /// \param protocol  must outlive it; the participant gets that of the own group
   SessionPlan(const Protocol& protocol, int participant_number, int session);
 
   bool finished() const { return !next_.has_value(); }

@@ -110,13 +110,13 @@ PUBLIC = {
     "runner/evidence/verification": "explain extreme_cases random_solids reference search union_cases",
     "runner/evidence/accuracy": "body_study paper_first_contact peers study union_study",
     "rendering/bodies/soft": "soft_scene",
-    "protocols": "answer_keys difference json_document parse protocol schedule session_plan sweep_space "
+    "protocols": "answer_keys difference groups json_document parse protocol schedule session_plan sweep_space "
                  "tasks/block_order tasks/block_procedures tasks/levels tasks/texts",
     "protocols/procedures": "procedure procedure_spec psychometric",
-    "data/base": "checksum input_file json_text markdown random text",
+    "data/base": "checksum group_assignment input_file json_text markdown random text",
     "data": "column_table record stored_protocol sweep_record",
     "data/files": "atomic_file atomic_folder file_permissions text_sink output_check utc",
-    "data/store": "export_log participant_columns protocol_rows schema connection station_database store sweep_file "
+    "data/store": "export_log participant_columns participant_groups protocol_rows schema connection station_database store sweep_file "
                   "forget task_text",
     "data/export": "csv datasets sample_slots settings study_about delimited_row",
     "data/merge": "merge",
@@ -124,7 +124,7 @@ PUBLIC = {
     "analysis/input": "csv_reader trials study_record study_table sweep_table",
     "analysis/statistics": "analysis comparison conclusions describe group_simulation interval_coverage jobs mixed_model "
                            "paired paired_evidence pattern power plan quantiles sensitivity "
-                           "sweep_analysis task_analysis threshold_plan",
+                           "study_groups sweep_analysis task_analysis threshold_plan",
     "analysis/movement": "comparison measures pictures",
     "analysis/figures": "panel_drawing figures svg",
     "analysis/report": "coverage_report html_page hypotheses plan_record plan_report report study_report tables",

@@ -18,6 +18,7 @@
 #include "data/base/json_text.h"
 #include "data/base/text.h"
 #include "data/files/text_sink.h"
+#include "data/store/participant_groups.h"
 #include "data/store/store.h"
 #include "data/store/task_text.h"
 #include "data/stored_protocol.h"
@@ -35,7 +36,7 @@ const std::vector<std::string_view> kTaskColumns{
     "block_name",      "track",         "practice",        "timed_out",
     "simulated",       "session",       "block",           "trial",
     "response_time",   "protocol_name", "protocol_sha256", "comparison_interval",
-    "interval_onsets", "torque_driven", "program_version"};
+    "interval_onsets", "torque_driven", "program_version", "group"};
 const char* const kTasks[] = {"identify", "compare", "detect", "rate", "adjust", "external"};
 
 /// \param twice  receives the names of known columns that come again; nullptr: they do not matter
@@ -201,7 +202,7 @@ StudyTrial read_trial(TaskRow& row) {
   return trial;
 }
 
-/// Puts the trials of each track in their order, in the places that they have.
+/// Sorts the trials of each track within its own positions.
 void order_trials(std::vector<StudyTrial>& trials) {
   using Track =
       std::tuple<std::string, std::string, std::string, std::string, std::string, std::string>;
@@ -281,6 +282,19 @@ bool is_of_tasks(const std::string& path, const std::vector<std::string>& wanted
   return false;  // read_trials_csv says what is wrong
 }
 
+/// Puts the names of groups in the order of the protocols.
+void order_groups(const std::vector<ProtocolText>& protocols, GroupLabels& labels) {
+  GroupLabels ordered;
+  for (const ProtocolText& one : protocols) {
+    for (const std::string& name : data::read_stored_protocol(one.text).groups.names) {
+      if (std::ranges::find(ordered.names, name) == ordered.names.end())
+        ordered.names.push_back(name);
+    }
+  }
+  for (const auto& [participant, group] : labels.of) ordered.add(participant, labels.names[group]);
+  labels = std::move(ordered);
+}
+
 StudyTable read_tasks_csv(const std::string& path, const std::vector<std::string>& wanted,
                           const std::vector<ProtocolText>& protocols) {
   StudyTable table;
@@ -332,6 +346,13 @@ StudyTable read_tasks_csv(const std::string& path, const std::vector<std::string
     table.trials.push_back(read_trial(row));
     StudyTrial& trial = table.trials.back();
     trial.simulated = simulated;
+    if (!row.value("group").empty()) {
+      const std::string group(row.text("group"));
+      const std::string& known = table.group_labels.add(trial.participant, group);
+      if (known != group)
+        row.add_fault("group", "expected one group for each participant; found " +
+                                   printable(known) + " before");
+    }
     if (!protocols.empty()) trial.participant_number = row.whole("participant_number");
     note_shown(trial.protocol_sha256, table.provenance.protocol_sha256);
     note_shown(row.value("program_version"), table.provenance.program_versions);
@@ -353,6 +374,7 @@ StudyTable read_tasks_csv(const std::string& path, const std::vector<std::string
                           (wanted.empty() ? "" : " of the protocol " + wanted.front())});
   if (!faults.empty()) throw protocols::InputError(std::move(faults));
   for (const ProtocolText& one : protocols) put_protocol(one.sha256, one.text, path, table);
+  order_groups(protocols, table.group_labels);
   if (numbered) order_trials(table.trials);
   drop_missing_answers(table.trials);
   warn_of_alike_names(table);
@@ -383,6 +405,8 @@ StudyTable read_tasks_store(data::Store& store, const std::string& protocol) {
   table.source = table.provenance.source = path;
   std::vector<std::string> names, observers;
   const data::TorqueNotes torque_notes(store);
+  const data::ParticipantGroups groups(store);
+  table.group_labels.names = groups.names();
   TorqueCounts torque;
   store.for_each_trial([&](const data::StoredTrial& stored) {
     if (!is_protocol(protocol, stored.protocol_name, stored.protocol_sha256)) return;
@@ -397,6 +421,9 @@ StudyTable read_tasks_store(data::Store& store, const std::string& protocol) {
       table.trials.back().protocol_sha256 = stored.protocol_sha256;
       table.trials.back().participant_number = stored.participant.enrolled_number;
       table.trials.back().simulated = stored.participant.simulated;
+      if (const std::string group = groups.of(stored.participant, stored.protocol_sha256);
+          !group.empty())
+        table.group_labels.add(stored.participant.code, group);
       torque.add(stored.record.renderer, torque_notes.driven(stored));
       note_once(stored.protocol_name, names);
       note_once(stored.protocol_sha256, table.provenance.protocol_sha256);
@@ -443,6 +470,12 @@ StudyTable of_shapes(TrialTable times, const std::string& source,
 }
 
 }  // namespace
+
+const std::string& GroupLabels::add(const std::string& participant, const std::string& group) {
+  auto at = std::ranges::find(names, group);
+  if (at == names.end()) at = names.insert(names.end(), group);
+  return names[of.emplace(participant, static_cast<std::size_t>(at - names.begin())).first->second];
+}
 
 StudyTrial study_trial_of(const std::string& participant, const data::TrialRecord& record) {
   StudyTrial trial;

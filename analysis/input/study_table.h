@@ -1,6 +1,7 @@
 #pragma once
 // The trials of a study, from a database or a table, whatever it asked.
 
+#include <cstddef>
 #include <map>
 #include <optional>
 #include <string>
@@ -14,7 +15,15 @@
 
 namespace palpate::analysis {
 
-/// The trials of a study. A study of shapes has them as times alone, whatever their number.
+/// The groups of the participants whose trials are in a table.
+struct GroupLabels {
+  std::vector<std::string> names;         ///< in the protocol's order; empty: no groups
+  std::map<std::string, std::size_t> of;  ///< participant -> index of the group
+  /// \return the participant's group: another one if it was known before
+  const std::string& add(const std::string& participant, const std::string& group);
+};
+
+/// The trials of a study. One of shapes alone has only `times`.
 struct StudyTable {
   std::string source;              ///< path as the user gave it
   std::vector<StudyTrial> trials;  ///< of blocks of tasks, in the order of the source
@@ -26,6 +35,7 @@ struct StudyTable {
   Provenance provenance;       ///< of all trials
   std::string title;           ///< of the study, from its protocol; "": unknown
   std::vector<std::string> warnings;
+  GroupLabels group_labels;
   /// Answers that describe the participants of these trials; from databases only.
   std::vector<data::ParticipantColumn> people;
   /// Their protocols: name and SHA-256, each once.

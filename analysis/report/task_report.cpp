@@ -7,6 +7,7 @@
 #include <variant>
 
 #include "analysis/figures/figures.h"
+#include "analysis/report/between_report.h"
 #include "analysis/report/html_page.h"
 #include "analysis/report/report.h"
 #include "analysis/report/task_tables.h"
@@ -122,6 +123,12 @@ Table people_table(const StudyTable& source, const std::string& label) {
 }
 
 /// Sections of a page of tasks: results over participants, figures, each task's numbers.
+/// What was found: in a study of groups first between them.
+std::string headline(const StudyAnalysis& analysis) {
+  const std::string groups = groups_conclusion(analysis.between_groups);
+  return groups.empty() ? conclusion(analysis) : groups + " " + conclusion(analysis);
+}
+
 class TaskPage {
  public:
   TaskPage(const StudyAnalysis& analysis, const StudyRecord& record)
@@ -129,11 +136,12 @@ class TaskPage {
         record_(record),
         label_(analysis.table.simulated ? "SIMULATED PARTICIPANTS" : ""),
         figures_(task_figures(analysis)),
-        page_(conclusion(analysis), label_) {}
+        page_(headline(analysis), label_) {}
 
   std::string html(const std::string& program_version) {
     put_header();
     put_people();
+    put_groups();
     put_results();
     put_figures(true);
     put_cells();
@@ -173,6 +181,14 @@ class TaskPage {
     if (analysis_.table.people.empty()) return;
     page_.begin_section("people", "Participants", "Participants");
     put_table(page_.body(), people_table(analysis_.table, label_));
+    page_.end_section();
+  }
+
+  void put_groups() {
+    if (analysis_.between_groups.empty()) return;
+    page_.begin_section("groups", "Groups of participants", "Groups");
+    for (const Table& table : groups_tables(analysis_.between_groups, label_))
+      put_table(page_.body(), table);
     page_.end_section();
   }
 
@@ -1125,6 +1141,7 @@ std::string task_report_json(const StudyAnalysis& analysis, const std::string& p
   for (const TaskGroupComparison& one : analysis.group_models.comparisons)
     out["group_comparisons"].push_back(group_comparison_json(one));
   out.update(named_json(analysis));
+  put_groups(analysis.between_groups, out);
   if (analysis.identification)
     out["identification"] = read_ordered_json(report_json(*analysis.identification));
   return out.dump(1, ' ', false, TaskJson::error_handler_t::replace) + "\n";
@@ -1134,11 +1151,12 @@ std::string task_report_text(const StudyAnalysis& analysis) {
   std::string text;
   if (analysis.table.simulated) text += "SIMULATED PARTICIPANTS\n\n";
   if (!analysis.groups.empty() || analysis.identification)
-    text += paragraph_text(conclusion(analysis)) + "\n";
+    text += paragraph_text(headline(analysis)) + "\n";
   for (const std::string& warning : analysis.table.warnings) text += printable(warning, 400) + "\n";
   if (!analysis.table.warnings.empty()) text += "\n";
   for (const TaskCell& cell : analysis.cells) text += cell_text(cell);
   for (const TaskGroup& group : analysis.groups) text += group_text(group);
+  text += groups_text(analysis.between_groups);
   text += group_detection_text(analysis) + group_model_text(analysis);
   for (const TaskComparison& one : analysis.renderers) text += comparison_text(one, true);
   for (const TaskComparison& one : analysis.conditions) text += comparison_text(one, false);

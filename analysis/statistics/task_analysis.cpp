@@ -777,6 +777,7 @@ StudyAnalysis analyze_study(StudyTable table, const FunctionSettings& functions,
   identify_times(result.table);
   if (auto times = std::exchange(result.table.times, std::nullopt))
     result.identification = analyze(std::move(*times), settings, program_version);
+  result.between_groups = between_groups(result);
   return result;
 }
 

@@ -479,9 +479,7 @@ using Json = nlohmann::ordered_json;
 constexpr const char* kBidsVersion = "1.9.0";
 
 /// The columns of trials.csv without participant_id, which is in the file name.
-std::span<const Column> beh_columns(const ExportClock& clock) {
-  return trial_columns(clock).subspan(1);
-}
+std::span<const Column> beh_columns(const ExportClock& clock) { return columns_of_trial(clock); }
 
 const Column kOnset{
     "onset",
@@ -609,7 +607,10 @@ class BidsWriter : public DatasetWriter {
   void describe_derivatives(bool simulated);
   void describe_participants();
 
-  std::map<std::string, std::string> participants_;  // code -> value of the column simulated
+  struct Described {
+    std::string simulated, group;
+  };
+  std::map<std::string, Described> participants_;  // by code
   std::int64_t participant_ = -1;
   int session_ = 0;
   std::string session_stem_, scans_stem_;
@@ -639,8 +640,11 @@ void BidsWriter::begin_session(const StoredTrial& trial) {
                   labels_.at(trial.protocol_sha256).label;
   run_ = store_.has_samples(trial.participant, session_) ? 1 : 0;
   const std::string simulated = trial.participant.simulated ? "1" : "0";
-  const auto [at, added] = participants_.emplace(trial.participant.code, simulated);
-  if (!added && at->second != simulated) at->second = "mixed";
+  const std::string group = clock_.groups().of(trial.participant, trial.protocol_sha256);
+  const auto [at, added] =
+      participants_.emplace(trial.participant.code, Described{simulated, group});
+  if (!added && at->second.simulated != simulated) at->second.simulated = "mixed";
+  if (!added && at->second.group != group) at->second.group = "mixed";
   scans_stem_ = session_files(trial, "");
   if (!settings_.derived) return;
   const std::string stem =
@@ -682,7 +686,7 @@ void BidsWriter::add(const StoredTrial& trial) {
 
 void BidsWriter::add_row(const StoredTrial& trial) {
   row_ << duration_of(trial.record);
-  put_trial_without_participant(row_, trial, clock_);
+  put_columns_of_trial(row_, trial, clock_);
   table_.rows.push_back(
       {to_unix_ns(trial.run.clock, first_onset_ns(trial.record)), trial.record.trial, row_.end()});
   const ClockStamp& clock = trial.run.clock;
@@ -794,10 +798,13 @@ void BidsWriter::describe_participants() {
       settings_.pages ? participant_columns(store_) : std::vector<ParticipantColumn>();
   row_ << "participant_id"
        << "simulated";
+  const bool groups = clock_.groups().any();
+  if (groups) row_ << group_column().name;
   for (const ParticipantColumn& one : columns) row_ << one.from.column;
   std::string table(row_.end());
-  for (const auto& [code, simulated] : participants_) {
-    row_ << "sub-" + code << simulated;
+  for (const auto& [code, described] : participants_) {
+    row_ << "sub-" + code << described.simulated;
+    if (groups) row_ << described.group;
     for (const ParticipantColumn& one : columns) {
       const auto answer = one.answers.find(code);
       row_ << (answer == one.answers.end() ? std::string() : answer->second);
@@ -813,6 +820,12 @@ void BidsWriter::describe_participants() {
          {{"0", "a person"},
           {"1", "a SIMULATED participant, not a person"},
           {"mixed", "simulated with one protocol, a person with another: see the beh.tsv"}}}}}};
+  if (groups) {
+    Json& about = json[group_column().name] = {
+        {"Description", "Group of the participant; mixed: another one in another protocol"}};
+    for (const std::string& name : clock_.groups().names())
+      about["Levels"][name] = "a group of the protocol";
+  }
   for (const ParticipantColumn& one : columns) {
     Json& about = json[one.from.column] = {{"Description", one.from.question}};
     if (one.from.column == "age") about["Units"] = "year";

@@ -22,7 +22,7 @@ std::int64_t difference(std::int64_t a, std::int64_t b) {
 }  // namespace
 
 ExportClock::ExportClock(Store& store, Times times)
-    : times_(times), tasks_(have_blocks(store.protocols())), torque_(store) {
+    : times_(times), tasks_(have_blocks(store.protocols())), torque_(store), groups_(store) {
   if (relative()) firsts_ = store.first_onsets();
 }
 

@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "data/export/settings.h"
+#include "data/store/participant_groups.h"
 #include "data/store/store.h"
 #include "data/store/task_text.h"
 
@@ -22,6 +23,9 @@ class ExportClock {
   bool tasks() const { return tasks_; }
   /// Rows of trials have the column torque_driven if any run left torque out.
   const TorqueNotes& torque() const { return torque_; }
+
+  /// Rows of participants have the column group if any protocol has groups.
+  const ParticipantGroups& groups() const { return groups_; }
 
   Times times() const { return times_; }
   bool relative() const { return times_ == Times::relative; }
@@ -39,6 +43,7 @@ class ExportClock {
   Times times_;
   bool tasks_ = false;
   TorqueNotes torque_;
+  ParticipantGroups groups_;
   std::map<std::string, std::int64_t, std::less<>> firsts_;  // code -> ns since 1970
 };
 

@@ -113,7 +113,7 @@ std::int64_t write_attempts(Store& store, TextSink& out, const ExportClock& cloc
                             ExportedParticipants& participants, ProgressCounter& counter) {
   std::int64_t rows = 0;
   DelimitedRow row(DelimitedFormat::csv);
-  row << attempt_columns(clock.times());
+  row << attempt_columns(clock);
   out.write(row.end());
   store.for_each_cut_off([&](const StoredTrial& attempt) {
     put_attempt(row, attempt, clock);
@@ -154,8 +154,7 @@ ExportResult export_csv(Store& store, const std::string& path, const ExportSetti
   }
   if (!paths.codebook.empty()) {
     write_file(paths.codebook, [&](TextSink& sink) {
-      write_codebook(sink, all_facts(label_protocols(store, settings)), settings,
-                     trial_columns(clock));
+      write_codebook(sink, all_facts(label_protocols(store, settings)), settings, clock);
     });
   }
   result.simulated = participants.any_simulated();

@@ -92,7 +92,7 @@ void add_answers(nlohmann::ordered_json& levels, const ProtocolFacts& facts) {
 }  // namespace
 
 void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSettings& settings,
-                    std::span<const Column> trials) {
+                    const ExportClock& clock) {
   DelimitedRow row(DelimitedFormat::csv);
   row << "table"
       << "column"
@@ -100,8 +100,8 @@ void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSetti
       << "value"
       << "meaning";
   out.write(row.end());
-  describe_table("trials", trials, facts, settings, out);
-  describe_table("attempts", attempt_columns(settings.times), facts, settings, out);
+  describe_table("trials", trial_columns(clock), facts, settings, out);
+  describe_table("attempts", attempt_columns(clock), facts, settings, out);
   if (!settings.pages) return;
   describe_table("pages", page_columns(), facts, settings, out);
   for (const auto& [place, question] : facts.questions) {

@@ -86,9 +86,9 @@ std::string json_text(const nlohmann::ordered_json& json);
 
 /// Internal to data/export: a table that explains the columns of trials.csv and attempts.csv.
 /// RFC 4180 with the header table,column,unit,value,meaning: a row for each column, followed by one
-/// for each of its codes or fault bits. \param trials  columns of trials.csv
+/// for each of its codes or fault bits.
 void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSettings& settings,
-                    std::span<const Column> trials);
+                    const ExportClock& clock);
 
 // Internal to data/export: the common part of BIDS and Psych-DS: a folder of tables that appears
 // complete or not at all and is recorded in the database.

@@ -13,6 +13,7 @@ namespace palpate::data {
 namespace {
 
 const Column kParticipant{"participant_id", "Pseudonym of the participant"};
+const Column kGroup{"group", "Group of the participant; missing: the protocol has no groups"};
 const Column kSession{"session", "Session of the participant, from 1", "1"};
 const Column kBlock{"block", "Block, from 1 through all sessions of the participant", "1"};
 const Column kTrial{"trial", "Trial within the session, from 1", "1"};
@@ -188,6 +189,12 @@ std::vector<Column> with_torque(std::vector<Column> columns) {
   return columns;
 }
 
+/// After the participant.
+std::vector<Column> with_group(std::vector<Column> columns) {
+  columns.insert(columns.begin() + 1, kGroup);
+  return columns;
+}
+
 std::vector<Column> make_attempts() {
   return {kParticipant,
           kSession,
@@ -318,20 +325,37 @@ bool fits_tsv(std::string_view text) {
 }  // namespace
 
 std::span<const Column> trial_columns(const ExportClock& clock) {
-  using Tables = std::array<std::vector<Column>, 4>;  // with torque 1, with tasks 2
-  static const std::vector<Column> identified = make_trials(), asked = with_tasks(identified);
-  static const Tables absolute = {identified, with_torque(identified), asked, with_torque(asked)};
-  static const Tables relative = {made_relative(absolute[0]), made_relative(absolute[1]),
-                                  made_relative(absolute[2]), made_relative(absolute[3])};
-  return (clock.relative()
-              ? relative
-              : absolute)[(clock.tasks() ? 2U : 0U) + (clock.torque().any() ? 1U : 0U)];
+  // What an export may have, as bits of an index.
+  enum : unsigned { kTorque = 1, kTasks = 2, kGroups = 4, kRelative = 8, kAll = 16 };
+  static const auto tables = [] {
+    std::array<std::vector<Column>, kAll> made;
+    for (unsigned parts = 0; parts < kAll; ++parts) {
+      std::vector<Column> columns = make_trials();
+      if (parts & kTasks) columns = with_tasks(std::move(columns));
+      if (parts & kTorque) columns = with_torque(std::move(columns));
+      if (parts & kRelative) columns = made_relative(std::move(columns));
+      if (parts & kGroups) columns = with_group(std::move(columns));
+      made[parts] = std::move(columns);
+    }
+    return made;
+  }();
+  return tables[(clock.torque().any() ? kTorque : 0U) | (clock.tasks() ? kTasks : 0U) |
+                (clock.groups().any() ? kGroups : 0U) | (clock.relative() ? kRelative : 0U)];
 }
 
-std::span<const Column> attempt_columns(Times times) {
-  static const std::vector<Column> absolute = make_attempts(), relative = made_relative(absolute);
-  return times == Times::absolute ? absolute : relative;
+std::span<const Column> columns_of_trial(const ExportClock& clock) {
+  return trial_columns(clock).subspan(clock.groups().any() ? 2 : 1);
 }
+
+std::span<const Column> attempt_columns(const ExportClock& clock) {
+  static const std::vector<Column> absolute = make_attempts(), relative = made_relative(absolute),
+                                   absolute_of_groups = with_group(absolute),
+                                   relative_of_groups = with_group(relative);
+  if (clock.groups().any()) return clock.relative() ? relative_of_groups : absolute_of_groups;
+  return clock.relative() ? relative : absolute;
+}
+
+const Column& group_column() { return kGroup; }
 
 const Column& interval_column() {
   static const Column interval{"interval",
@@ -380,8 +404,10 @@ TaskValues::TaskValues(const TrialRecord& record) {
 
 void put_attempt(DelimitedRow& row, const StoredTrial& attempt, const ExportClock& clock) {
   const TrialRecord& record = attempt.record;
-  row << attempt.participant.code << record.session << record.block << record.trial
-      << record.attempt << record.renderer << record.shape;
+  row << attempt.participant.code;
+  if (clock.groups().any()) row << clock.groups().of(attempt.participant, attempt.protocol_sha256);
+  row << record.session << record.block << record.trial << record.attempt << record.renderer
+      << record.shape;
   for (const double q : record.orientation_wxyz) row << q;
   row << record.practice << clock.onset_utc(attempt) << attempt.cut_off_reason << attempt.run.device
       << attempt.participant.simulated << attempt.protocol_sha256 << attempt.run.program_version

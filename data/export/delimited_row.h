@@ -37,11 +37,15 @@ struct Column {
   enum class Names { none, stimuli, blocks, answers } names = Names::none;
 };
 
-/// Columns of trials.csv, in order, as an export has them. Blocks of tasks, runs with torque left
-/// out and relative times add some.
+/// Columns of trials.csv, in order, as an export has them. Groups, blocks of tasks, runs with
+/// torque left out and relative times add some.
 std::span<const Column> trial_columns(const ExportClock& clock);
-std::span<const Column> attempt_columns(Times times);  ///< of attempts.csv, likewise
-std::span<const Column> sample_columns();              ///< of a servo tick, in order
+/// Those that do not only describe the participant.
+std::span<const Column> columns_of_trial(const ExportClock& clock);
+std::span<const Column> attempt_columns(const ExportClock& clock);  ///< of attempts.csv, likewise
+/// The group of a participant.
+const Column& group_column();
+std::span<const Column> sample_columns();  ///< of a servo tick, in order
 /// After them, if a stimulus of the protocol moves: its state after the tick.
 std::span<const Column> body_columns();
 /// After those, if contacts are requested.
@@ -111,9 +115,9 @@ inline std::optional<bool> correct_of(const TrialRecord& record) {
   return record.correct;
 }
 
-/// Without the first column, participant_id. \param row  a DelimitedRow or a ColumnTable
+/// columns_of_trial(). \param row  a DelimitedRow or a ColumnTable
 template <class Row>
-void put_trial_without_participant(Row& row, const StoredTrial& trial, const ExportClock& clock) {
+void put_columns_of_trial(Row& row, const StoredTrial& trial, const ExportClock& clock) {
   const TrialRecord& record = trial.record;
   row << record.session << record.block << record.trial << record.renderer << record.shape
       << record.response << correct_of(record) << record.response_time;
@@ -142,7 +146,8 @@ void put_trial_without_participant(Row& row, const StoredTrial& trial, const Exp
 template <class Row>
 void put_trial(Row& row, const StoredTrial& trial, const ExportClock& clock) {
   row << trial.participant.code;
-  put_trial_without_participant(row, trial, clock);
+  if (clock.groups().any()) row << clock.groups().of(trial.participant, trial.protocol_sha256);
+  put_columns_of_trial(row, trial, clock);
 }
 /// attempt_columns()
 void put_attempt(DelimitedRow& row, const StoredTrial& attempt, const ExportClock& clock);

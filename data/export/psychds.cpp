@@ -83,7 +83,7 @@ class PsychDsWriter : public DatasetWriter {
   void describe_dataset(bool simulated) override;
   /// One table for all participants and protocols, which are columns of it.
   std::string begin_attempts() override {
-    use(attempt_columns(settings_.times));
+    use(attempt_columns(clock_));
     return "data/study-" + labels_.begin()->second.label + "_description-attempts_data.csv";
   }
   std::string begin_pages() override {
@@ -193,7 +193,7 @@ Json PsychDsWriter::variables() const {
     }
   };
   add(trial_columns(clock_));
-  add(attempt_columns(settings_.times));
+  add(attempt_columns(clock_));
   add({&interval_column(), 1});
   add({&kTimeOfTick, 1});
   add(sample_columns());

@@ -47,9 +47,10 @@ std::vector<int> blocks_in_order(const Protocol& protocol, int participant_numbe
   units.pop_back();
   std::vector<int> order;
   const int count = static_cast<int>(units.size());
-  const std::vector<int> row = protocol.blocks_counterbalanced && count > 1
-                                   ? latin_square_row(count, participant_number)
-                                   : std::vector<int>();
+  const std::vector<int> row =
+      protocol.blocks_counterbalanced && count > 1
+          ? latin_square_row(count, protocol.groups.row(participant_number))
+          : std::vector<int>();
   for (int i = 0; i < count; ++i) {
     const int at = row.empty() ? i : row[static_cast<std::size_t>(i)];
     const auto& unit = units[static_cast<std::size_t>(at)];

@@ -7,6 +7,7 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "protocols/groups.h"
 #include "protocols/parse.h"
 #include "runner/commands/shared/command.h"
 #include "runner/output/outputs.h"
@@ -71,12 +72,21 @@ void print_table(const protocols::Protocol& protocol, const std::vector<protocol
   }
 }
 
+/// The number of participant `row` of a group. \throws UsageError
+int number_in(const std::string& name, const GroupAssignment& groups, int row) {
+  if (!groups.any()) throw UsageError("--group: the protocol has no groups");
+  const std::size_t group = groups.find(name);
+  if (group == groups.names.size())
+    throw UsageError("--group: expected " + join_names(groups.names) + ", found '" + name + "'");
+  return groups.number(group, row);
+}
+
 }  // namespace
 
 int schedule_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage =
-      "palpate schedule PROTOCOL.json (--participant N | --recover N) [--format "
+      "palpate schedule PROTOCOL.json (--participant N [--group NAME] | --recover N) [--format "
       "table|csv|json|order]";
   line.summary =
       "Prints the trials that a participant will get, in order, without running them.\n"
@@ -88,6 +98,7 @@ int schedule_command(const std::vector<std::string>& args) {
   line.positional_names = {"PROTOCOL.json"};
   line.options.add_options()("participant", po::value<int>()->value_name("N"),
                              "participant number: 1, 2, ...")(
+      "group", po::value<std::string>()->value_name("NAME"), "the N-th participant of this group")(
       "format", po::value<std::string>()->default_value("table")->value_name("FORMAT"),
       "table, csv, json, or order: the lines of which a registration holds the checksum")(
       "recover", po::value<int>()->value_name("N"),
@@ -101,20 +112,25 @@ int schedule_command(const std::vector<std::string>& args) {
     throw UsageError("--format: expected table, csv, json or order, found '" + format + "'");
   }
 
-  const protocols::Protocol protocol =
+  const protocols::Protocol all =
       protocols::parse_protocol((*values)["PROTOCOL.json"].as<std::string>());
   if (values->count("recover")) {
     if (format == "order") throw UsageError("--recover: is no order; expected table, csv or json");
     const int count = (*values)["recover"].as<int>();
     if (count < 2 || count > 100000) throw UsageError("--recover: must be 2 to 100000");
-    std::cout << study::recovery_text(protocol, count, (*values)["seed"].as<std::uint64_t>(),
-                                      format);
+    std::cout << study::recovery_text(all, count, (*values)["seed"].as<std::uint64_t>(), format);
     return 0;
   }
   if (values->count("participant") == 0)
     throw UsageError("expected --participant N\nUsage: " + line.usage + "\nMore: add --help");
-  const int participant = (*values)["participant"].as<int>();
+  int participant = (*values)["participant"].as<int>();
   study::check_participant_number(participant);
+  if (values->count("group"))
+    participant = number_in(text_of(*values, "group"), all.groups, participant);
+  const protocols::Protocol& protocol = protocols::protocol_of(all, participant);
+  if (all.groups.any() && format == "table")
+    std::cout << "participant " << participant << ", group " << all.groups.name(participant)
+              << "\n";
   if (format == "order") {
     std::cout << study::fixed_order(protocol, participant);
     return 0;

@@ -10,6 +10,7 @@
 #include <map>
 #include <optional>
 #include <set>
+#include <sstream>
 #include <string>
 #include <system_error>
 #include <thread>
@@ -32,6 +33,7 @@ namespace po = boost::program_options;
 struct SimulateSettings {
   StudyOptions study;
   std::string database, shard, advisor;
+  std::string groups;  ///< "young=12,old=10"; empty: --participants counts
   double advisor_time_out = 1;
   int jobs = 1;
 };
@@ -60,6 +62,9 @@ std::optional<SimulateSettings> parse_simulate_settings(const std::vector<std::s
        "database; created or resumed");
   add_study_options(line, settings.study);
   line.options.add_options()  //
+      ("groups", po::value(&settings.groups)->value_name("NAME=N,..."),
+       "participants of each group, where the protocol leaves the group to the experimenter; "
+       "instead of --participants")  //
       ("jobs", po::value(&settings.jobs)->default_value(settings.jobs)->value_name("J"),
        "sessions simulated at a time")  //
       ("shard", po::value(&settings.shard)->default_value("1/1")->value_name("K/N|auto"),
@@ -76,12 +81,39 @@ std::optional<SimulateSettings> parse_simulate_settings(const std::vector<std::s
   check_advisor(settings.advisor, settings.advisor_time_out);
   if (!settings.advisor.empty()) settings.jobs = 1;
   check_study_options(*values, settings.study);
+  if (!settings.groups.empty() && !(*values)["participants"].defaulted())
+    throw UsageError("--groups: says how many participants; leave out --participants");
   if (settings.jobs < 1 || settings.jobs > 1024) throw UsageError("--jobs: must be 1 to 1024");
   return settings;
 }
 
+/// The numbers that participants of groups get as they come: "young=12,old=10".
+/// \throws UsageError
+std::vector<int> numbers_of_groups(const std::string& text, const GroupAssignment& groups) {
+  if (groups.rule != GroupAssignment::Rule::given || !groups.any())
+    throw UsageError(
+        "--groups: the protocol assigns groups itself, or has none; use --participants");
+  const std::string expected = "--groups: expected NAME=N,... of " + join_names(groups.names);
+  std::set<int> numbers;
+  std::istringstream parts(text);
+  for (std::string part; std::getline(parts, part, ',');) {
+    const std::size_t equals = part.find('=');
+    const std::size_t group = groups.find(part.substr(0, equals));
+    const std::string digits = equals == std::string::npos ? "" : part.substr(equals + 1);
+    const bool is_count = !digits.empty() && digits.size() < 6 &&
+                          digits.find_first_not_of("0123456789") == std::string::npos;
+    if (group == groups.names.size() || !is_count)
+      throw UsageError(expected + ", found '" + part + "'");
+    if (numbers.contains(groups.number(group, 1)))
+      throw UsageError(expected + " once each, found '" + part + "'");
+    for (int row = 1; row <= std::stoi(digits); ++row) numbers.insert(groups.number(group, row));
+  }
+  if (numbers.empty()) throw UsageError(expected + " with at least one participant");
+  return {numbers.begin(), numbers.end()};
+}
+
 /// \throws UsageError: no such shard
-session::StudyPlan plan_of(const SimulateSettings& settings) {
+session::StudyPlan plan_of(const SimulateSettings& settings, const GroupAssignment& groups) {
   const Shard shard =
       parse_shard(settings.shard, [](const char* name) { return std::getenv(name); });
   session::StudyPlan plan;
@@ -89,8 +121,11 @@ session::StudyPlan plan_of(const SimulateSettings& settings) {
   plan.jobs = settings.jobs;
   plan.advisor = settings.advisor;
   plan.advisor_time_out = settings.advisor_time_out;
-  plan.before = static_cast<int>(shard.first(settings.study.participants));
-  plan.participants = static_cast<int>(shard.last(settings.study.participants));
+  const std::vector<int> all = settings.groups.empty()
+                                   ? session::first_numbers(settings.study.participants)
+                                   : numbers_of_groups(settings.groups, groups);
+  const auto count = static_cast<std::int64_t>(all.size());
+  plan.numbers.assign(all.begin() + shard.first(count), all.begin() + shard.last(count));
   return plan;
 }
 
@@ -162,8 +197,8 @@ int simulate_command(const std::vector<std::string>& args) {
   const std::optional<SimulateSettings> given = parse_simulate_settings(args);
   if (!given) return 0;
   const StudyOptions& options = given->study;
-  session::StudyPlan plan = plan_of(*given);
   protocols::Protocol protocol = protocols::parse_protocol(options.protocol);
+  session::StudyPlan plan = plan_of(*given, protocol.groups);
   std::optional<data::Store> store;
   const auto open = [&] {
     return data::Store::open(given->database, data::Store::Mode::write_or_create);

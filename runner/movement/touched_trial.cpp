@@ -223,18 +223,19 @@ int TouchedStimuli::stimulus(const std::string& name) const {
 std::shared_ptr<const TouchedStimuli> StudyStimuli::of(data::Store& store,
                                                        const data::StoredTrial& trial) {
   const std::lock_guard<std::mutex> lock(mutex_);
-  const std::string& sha = trial.protocol_sha256;
   const auto run = std::tuple(trial.participant.id, trial.record.session, trial.run.clock.utc_ns,
                               trial.run.clock.monotonic_ns);
   if (const auto known = by_run_.find(run); known != by_run_.end()) return known->second;
   bool limited = false;
   protocols::Protocol protocol = session::protocol_as_shown(store, trial, folder_, limited);
   std::shared_ptr<const TouchedStimuli> made;
-  if (const auto known = by_protocol_.find(sha); !limited && known != by_protocol_.end())
+  const std::string group = protocol.groups.name(trial.participant.enrolled_number);
+  const auto shown = std::pair(trial.protocol_sha256, group);
+  if (const auto known = by_protocol_.find(shown); !limited && known != by_protocol_.end())
     made = known->second;
   else
     made = std::make_shared<TouchedStimuli>(std::move(protocol));
-  if (!limited) by_protocol_[sha] = made;
+  if (!limited) by_protocol_[shown] = made;
   return by_run_[run] = made;
 }
 

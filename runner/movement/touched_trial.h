@@ -66,7 +66,8 @@ class StudyStimuli {
  private:
   std::mutex mutex_;
   const std::string folder_;
-  std::map<std::string, std::shared_ptr<const TouchedStimuli>> by_protocol_;
+  /// By the SHA-256 of a protocol and the name of a group.
+  std::map<std::pair<std::string, std::string>, std::shared_ptr<const TouchedStimuli>> by_protocol_;
   std::map<std::tuple<std::int64_t, int, std::int64_t, std::int64_t>,
            std::shared_ptr<const TouchedStimuli>>
       by_run_;

@@ -17,6 +17,7 @@
 #include "data/files/utc.h"
 #include "data/store/task_text.h"
 #include "protocols/difference.h"
+#include "protocols/groups.h"
 #include "protocols/json_document.h"
 #include "protocols/tasks/block_order.h"
 #include "runner/build_info.h"
@@ -273,10 +274,13 @@ using OrderCounts = std::map<std::string, std::size_t>;
 /// Empty where the order is not counterbalanced.
 OrderCounts registered_orders(const Registration& registered) {
   OrderCounts out;
-  const auto repeat = static_cast<std::size_t>(protocols::block_orders(registered.protocol));
-  if (repeat < 2) return out;
+  const protocols::Protocol& protocol = registered.protocol;
+  const auto orders = static_cast<std::size_t>(protocols::block_orders(protocol));
+  if (orders < 2) return out;
+  // With groups in permuted blocks nothing repeats.
+  const std::size_t repeat = protocol.groups.any() ? registered.participants : orders;
   for (std::size_t i = 0; i < std::min(repeat, registered.participants); ++i)
-    out[study::condition_order(registered.protocol, static_cast<int>(i) + 1)] +=
+    out[study::condition_order(protocol, static_cast<int>(i) + 1)] +=
         (registered.participants - i + repeat - 1) / repeat;
   return out;
 }
@@ -355,29 +359,31 @@ CheckPoint of_participants(const Registration& registered, const StudyData& stud
 }
 
 CheckPoint of_trials(const Registration& registered, const StudyData& study) {
-  const std::size_t planned = study::planned_trials(registered.protocol);
   const bool adaptive = study::has_adaptive_blocks(registered.protocol);
+  const auto planned_of = [&registered](int number) {
+    return study::planned_trials(protocols::protocol_of(registered.protocol, number));
+  };
   const std::string registered_words =
       adaptive ? "trials up to the end of every procedure"
-               : "the registered " + counted(planned, "trial", "trials");
+               : "the registered " + counted(planned_of(1), "trial", "trials");
   CheckPoint out{"trials", "Number of trials", Finding::as_registered,
                  "Every participant has " + registered_words + "."};
   for (const StudyParticipant& one : study.participants) {
     const int number = std::max(1, one.person.enrolled_number);
     const std::size_t found = rows_that_count(one.shown).size();
     if (adaptive ? study::expected_trials(registered.protocol, number, one.shown).complete
-                 : found == planned)
+                 : found == planned_of(number))
       continue;
     out.evidence.push_back(one.person.code + ": " + std::to_string(found) +
                            (adaptive ? " trials, and not at the end of every session"
-                                     : " of " + std::to_string(planned) + " trials"));
+                                     : " of " + std::to_string(planned_of(number)) + " trials"));
   }
   if (out.evidence.empty()) return out;
   out.finding = Finding::deviation;
-  out.sentence =
-      counted(out.evidence.size(), "participant has", "participants have") +
-      (adaptive ? " not all trials."
-                : " another number of trials than the registered " + std::to_string(planned) + ".");
+  out.sentence = counted(out.evidence.size(), "participant has", "participants have") +
+                 (adaptive ? " not all trials."
+                           : " another number of trials than the registered " +
+                                 std::to_string(planned_of(1)) + ".");
   cut(out.evidence);
   return out;
 }

@@ -399,7 +399,7 @@ void PlannedTasks::write(const std::string& folder, const std::string& csv,
   data::Store store = data::Store::open((fs::path(folder) / "study.db").string(),
                                         data::Store::Mode::write_or_create);
   session::StudyPlan plan;
-  plan.participants = static_cast<int>(made_.participants);
+  plan.numbers = session::first_numbers(static_cast<int>(made_.participants));
   plan.seed = made_.seed;
   plan.planned = judgement(0, with_effect);
   session::simulate_study(protocol_, store, settings_, plan, {}, {});

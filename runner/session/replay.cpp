@@ -12,6 +12,7 @@
 #include <string>
 #include <utility>
 
+#include "protocols/groups.h"
 #include "protocols/parse.h"
 #include "protocols/session_plan.h"
 #include "runner/scene_builder.h"
@@ -114,7 +115,8 @@ protocols::Protocol stored_protocol(data::Store& store, const data::StoredTrial&
     files.emplace(file.name, std::move(file.bytes));
   const std::filesystem::path place =
       std::filesystem::path(mesh_folder) / (trial.protocol_name + ".json");
-  return protocols::parse_protocol_text(text, place.string(), files);
+  const protocols::Protocol all = protocols::parse_protocol_text(text, place.string(), files);
+  return protocols::protocol_of(all, trial.participant.enrolled_number);
 }
 
 /// Scales the materials down to the limits of the device of the trial's run. True: there were any

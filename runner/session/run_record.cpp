@@ -19,16 +19,21 @@ void add_files(const stimuli::ObjectSpec& spec, std::vector<data::ProtocolFile>&
   add_file(spec.file_name, spec.file_bytes, files);
 }
 
+void add_files(const protocols::Protocol& protocol, std::vector<data::ProtocolFile>& files) {
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
+    add_files(stimulus.object, files);
+  for (const protocols::PageSpec& page : protocol.pages) {
+    for (const protocols::PagePicture& picture : page.pictures)
+      add_file(picture.file, picture.bytes, files);
+  }
+}
+
 }  // namespace
 
 data::ProtocolInfo info_of(const protocols::Protocol& protocol) {
   data::ProtocolInfo info{protocol.name, protocol.source_text, protocol.sha256};
-  for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
-    add_files(stimulus.object, info.files);
-  for (const protocols::PageSpec& page : protocol.pages) {
-    for (const protocols::PagePicture& picture : page.pictures)
-      add_file(picture.file, picture.bytes, info.files);
-  }
+  add_files(protocol, info.files);
+  for (const auto& group : protocol.group_protocols) add_files(*group, info.files);
   return info;
 }
 

@@ -9,12 +9,14 @@
 #include <map>
 #include <memory>
 #include <mutex>
+#include <numeric>
 #include <stdexcept>
 #include <string>
 #include <thread>
 #include <utility>
 
 #include "protocols/difference.h"
+#include "protocols/groups.h"
 #include "protocols/schedule.h"
 #include "protocols/tasks/block_order.h"
 #include "runner/build_info.h"
@@ -195,10 +197,11 @@ std::vector<Work> unfinished_work(const protocols::Protocol& protocol, data::Sto
   std::vector<Work> todo;
   const data::ProtocolInfo info = info_of(protocol);
   refuse_changed(store, info);
-  for (int number = plan.before + 1; number <= plan.participants; ++number) {
+  for (const int number : plan.numbers) {
+    const protocols::Protocol& shown = protocols::protocol_of(protocol, number);
     const data::Participant participant =
         store.enrol(info, simulated_code(number), number, true, plan.seed);
-    for (int session = 1; session <= protocol.sessions.count; ++session) {
+    for (int session = 1; session <= shown.sessions.count; ++session) {
       Work work;
       work.participant = participant;
       work.session = session;
@@ -212,8 +215,8 @@ std::vector<Work> unfinished_work(const protocols::Protocol& protocol, data::Sto
         work.answers.push_back(outcome_of(record));
       if (!plan.advisor.empty()) work.completed = before.completed;
       work.clock_ns = before.latest_ns;
-      work.info = simulated_run(protocol, settings, number, session);
-      if (!protocol.pages.empty()) work.page_answers = store.answers_in_force(participant, session);
+      work.info = simulated_run(shown, settings, number, session);
+      if (!shown.pages.empty()) work.page_answers = store.answers_in_force(participant, session);
       const protocols::SessionPlan trials = plan_of(protocol, work);
       progress.recorded += static_cast<std::int64_t>(trials.done());
       progress.expected += static_cast<std::int64_t>(trials.size());
@@ -299,6 +302,31 @@ class Recorder {
   std::map<std::size_t, data::Run> runs_;
 };
 
+/// What simulated participants of each group do.
+class SimulatedGroups {
+ public:
+  /// \param protocol, settings  must outlive it. \throws as SimulatedStudy
+  SimulatedGroups(const protocols::Protocol& protocol,
+                  const participants::SimulatedSettings& settings, std::uint64_t seed,
+                  const participants::JudgementOf& planned)
+      : groups_(protocol.groups) {
+    std::vector<const protocols::Protocol*> shown;
+    for (const auto& group : protocol.group_protocols) shown.push_back(group.get());
+    if (shown.empty()) shown.push_back(&protocol);
+    for (const protocols::Protocol* const one : shown) {
+      studies_.push_back(std::make_unique<SimulatedStudy>(*one, settings, seed));
+      studies_.back()->planned = planned;
+    }
+  }
+  const SimulatedStudy& study_of(int participant_number) const {
+    return *studies_[groups_.group(participant_number)];
+  }
+
+ private:
+  const GroupAssignment& groups_;
+  std::vector<std::unique_ptr<SimulatedStudy>> studies_;
+};
+
 devices::SimulatedStylus simulated_stylus(const protocols::Protocol& protocol,
                                           const participants::SimulatedSettings& settings) {
   return {settings.device, settings.hand, protocol.stylus.length, protocol.stylus.grip,
@@ -348,6 +376,12 @@ void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& 
   }
 }
 
+std::vector<int> first_numbers(int participants) {
+  std::vector<int> numbers(static_cast<std::size_t>(participants));
+  std::iota(numbers.begin(), numbers.end(), 1);
+  return numbers;
+}
+
 data::RunInfo simulated_run(const protocols::Protocol& protocol,
                             const participants::SimulatedSettings& settings, int participant,
                             int session) {
@@ -372,17 +406,17 @@ bool simulate_in_memory(
     int participants, std::uint64_t seed, const std::atomic<bool>& stop,
     const std::function<void(int, const data::TrialRecord&, std::uint64_t)>& visit,
     const participants::JudgementOf& planned) {
-  SimulatedStudy study(protocol, settings, seed);
-  study.planned = planned;
+  const SimulatedGroups groups(protocol, settings, seed, planned);
   for (int number = 1; number <= participants; ++number) {
-    for (int session = 1; session <= protocol.sessions.count; ++session) {
+    const SimulatedStudy& study = groups.study_of(number);
+    for (int session = 1; session <= study.protocol.sessions.count; ++session) {
       VisitingLog log([&](const data::TrialRecord& record) {
         const double ticks = *record.contact_share * static_cast<double>(record.ticks);
         visit(number, record, static_cast<std::uint64_t>(std::llround(ticks)));
       });
       run_simulated_session(study,
                             {number, protocols::SessionPlan(protocol, number, session), 0,
-                             simulated_run(protocol, settings, number, session).clock},
+                             simulated_run(study.protocol, settings, number, session).clock},
                             log, [&stop] { return stop.load(); });
       if (stop) return false;
     }
@@ -435,8 +469,7 @@ StudyProgress simulate_study(const protocols::Protocol& protocol, data::Store& s
                              const participants::SimulatedSettings& settings, const StudyPlan& plan,
                              const std::atomic<bool>& stop,
                              const std::function<void(const StudyProgress&)>& report) {
-  SimulatedStudy study(protocol, settings, plan.seed);
-  study.planned = plan.planned;
+  const SimulatedGroups groups(protocol, settings, plan.seed, plan.planned);
   std::atomic<bool> failed{false};  // a worker or the store threw
   const auto halting = [&] { return stop || failed; };
 
@@ -452,7 +485,8 @@ StudyProgress simulate_study(const protocols::Protocol& protocol, data::Store& s
     std::exception_ptr error;
     try {
       for (std::size_t i = next++; i < sessions.size() && !halting(); i = next++) {
-        run_session(study, sessions[i], i, queue, plan, halting);
+        run_session(groups.study_of(sessions[i].participant.enrolled_number), sessions[i], i, queue,
+                    plan, halting);
       }
     } catch (...) {
       error = std::current_exception();

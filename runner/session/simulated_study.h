@@ -70,14 +70,16 @@ bool simulate_in_memory(
     const std::function<void(int, const data::TrialRecord&, std::uint64_t)>& visit,
     const participants::JudgementOf& planned = {});
 
+/// 1, 2, ... of so many participants.
+std::vector<int> first_numbers(int participants);
+
 struct StudyPlan {
-  int participants = 7;         ///< number of the last one
-  int before = 0;               ///< number before that of the first one
-  std::uint64_t seed = 1;       ///< of the participants; the schedule has the protocol's own
-  int jobs = 1;                 ///< threads
-  std::string event = {};       ///< for each session's record; empty: none
-  std::string advisor = {};     ///< socket of a program that proposes levels; empty: none
-  double advisor_time_out = 1;  ///< s
+  std::vector<int> numbers = {};  ///< of the participants, in order
+  std::uint64_t seed = 1;         ///< of the participants; the schedule has the protocol's own
+  int jobs = 1;                   ///< threads
+  std::string event = {};         ///< for each session's record; empty: none
+  std::string advisor = {};       ///< socket of a program that proposes levels; empty: none
+  double advisor_time_out = 1;    ///< s
   participants::JudgementOf planned = {};  ///< as of SimulatedStudy
 };
 

@@ -18,10 +18,12 @@
 #include "data/record.h"
 #include "data/store/store.h"
 #include "protocols/difference.h"
+#include "protocols/groups.h"
 #include "protocols/parse.h"
 #include "runner/build_info.h"
 #include "runner/session/device_check.h"
 #include "runner/session/run_record.h"
+#include "runner/station/group_choice.h"
 #include "runner/station/protocol_choice.h"
 #include "runner/station/run_settings.h"
 #include "runner/terminal.h"
@@ -179,6 +181,7 @@ struct Known {
   std::vector<std::string> others;  ///< differences from protocols of the same name, in words
   std::optional<int> number;        ///< for a new participant, if texts changed
   std::optional<std::int64_t> newest_ns;
+  GroupFacts groups;
 };
 
 /// Other texts, the same trials: one counterbalancing, so its numbers continue.
@@ -206,6 +209,34 @@ void count_on(data::Store& store, const protocols::Protocol& protocol, const Run
   known.number = settings.number.value_or(next);
 }
 
+/// Whether every session of the participant is done.
+bool has_completed(data::Store& store, const protocols::Protocol& protocol,
+                   const data::Participant& one) {
+  const int sessions = protocols::protocol_of(protocol, one.enrolled_number).sessions.count;
+  for (int session = 1; session <= sessions; ++session) {
+    if (store.progress(one, session).last_end != data::RunEnd::done) return false;
+  }
+  return true;
+}
+
+GroupFacts facts_of_groups(data::Store& store, const protocols::Protocol& protocol,
+                           const std::string& code) {
+  GroupFacts facts;
+  facts.completed.resize(protocol.groups.names.size());
+  for (const data::ProtocolInfo& info : store.protocols()) {
+    if (info.name != protocol.name) continue;
+    const bool same = protocols::difference(info.text, protocol.source_text).only_texts();
+    for (const data::Participant& one : store.participants(info.sha256)) {
+      if (one.code == code) facts.enrolled = one.enrolled_number;
+      if (!same) continue;
+      facts.taken.insert(one.number);
+      if (has_completed(store, protocol, one))
+        ++facts.completed[protocol.groups.group(one.enrolled_number)];
+    }
+  }
+  return facts;
+}
+
 /// Refuses a code whose newest run, in any protocol, ended with a withdrawal. \throws UsageError
 void refuse_withdrawn(data::Store& store, const std::string& code) {
   const std::string when = withdrawn_when(store, code);
@@ -224,6 +255,7 @@ Known look_into(const RunSettings& settings, const protocols::Protocol& protocol
   for (const data::Participant& one : store.participants(protocol.sha256))
     known.enrolled = known.enrolled || one.code == code;
   known.newest_ns = store.latest_recorded_time();
+  if (protocol.groups.any()) known.groups = facts_of_groups(store, protocol, code);
   if (known.enrolled) return known;
   known.earlier = earlier_protocol(store, protocol, code);
   if (known.earlier) return known;
@@ -302,6 +334,34 @@ void check_clock(const RunSettings& settings, const Known& known, Admission& adm
   say("CLOCK: " + doubt);
   admission.warnings.push_back("CLOCK: " + doubt);
   admission.notes.push_back(nlohmann::json{{"clock_warning", doubt}}.dump());
+}
+
+/// Gives a new participant a number of the group, and admits to the group's own protocol.
+void join_group(const RunSettings& settings, const Known& known, Admission& admission) {
+  admission.shown = session::info_of(admission.protocol);
+  GroupFacts facts = known.groups;
+  const GroupAssignment& groups = admission.protocol.groups;
+  facts.completed.resize(groups.names.size());
+  if (const std::optional<int> number = number_in_group(settings, admission.protocol, facts))
+    admission.number = number;
+  if (!groups.any()) return;
+  if (!admission.number && !facts.enrolled) {
+    int next = 1;
+    while (facts.taken.contains(next)) ++next;
+    admission.number = next;
+  }
+  const int number = facts.enrolled ? *facts.enrolled : *admission.number;
+  if (settings.fill && !facts.enrolled) {
+    nlohmann::ordered_json completed;
+    for (std::size_t i = 0; i < groups.names.size(); ++i)
+      completed[groups.names[i]] = facts.completed[i];
+    admission.notes.push_back(nlohmann::ordered_json{
+        {"group_filled", {{"group", groups.name(number)}, {"completed", completed}}}}
+                                  .dump());
+  }
+  say("group " + groups.name(number));
+  const protocols::Protocol own = protocols::protocol_of(admission.protocol, number);
+  admission.protocol = own;
 }
 
 std::string ask_new_code() {
@@ -407,9 +467,8 @@ data::RunInfo run_info(const RunSettings& settings, const servo::DeviceCapabilit
 }
 
 std::optional<data::ProtocolInfo> other_texts(const Admission& admission) {
-  data::ProtocolInfo shown = session::info_of(admission.protocol);
-  if (shown.sha256 == admission.enrolled.sha256) return std::nullopt;
-  return shown;
+  if (admission.shown.sha256 == admission.enrolled.sha256) return std::nullopt;
+  return admission.shown;
 }
 
 Admission admit(const RunSettings& settings) {
@@ -433,6 +492,7 @@ Admission admit(const RunSettings& settings) {
           protocols::parse_protocol_text(known.earlier->info.text, settings.protocol, files);
       admission.enrolled = session::info_of(stored);
       if (choice == ProtocolChoice::stored) admission.protocol = std::move(stored);
+      join_group(settings, known, admission);
       return admission;
     }
     admission.participant = ask_new_code();
@@ -441,6 +501,7 @@ Admission admit(const RunSettings& settings) {
   }
   if (known.number) admission.number = known.number;
   admission.enrolled = session::info_of(admission.protocol);
+  join_group(settings, known, admission);
   return admission;
 }
 

@@ -47,7 +47,8 @@ struct Admission {
   std::string participant;       ///< may differ from the named one
   std::optional<int> number;     ///< to be assigned; none: the next unused one
   data::ProtocolInfo enrolled;   ///< the protocol that the participant is, or will be, enrolled in
-  protocols::Protocol protocol;  ///< to be shown; the same except for its texts
+  protocols::Protocol protocol;  ///< to be shown: the group's own; else the same but for texts
+  data::ProtocolInfo shown;      ///< that protocol, with the files of all groups
   std::vector<std::string> warnings;  ///< for the experimenter, also on the console
   std::vector<std::string> notes;     ///< JSON, for the record
 };

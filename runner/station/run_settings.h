@@ -23,6 +23,8 @@ struct RunSettings {
   bool no_window = false, full_screen = false, buttons = false, without_calibration = false,
        without_noise = false, new_participant = false, after_withdrawal = false,
        marker_codes = false, sync = false;
+  std::string group;            ///< of a new participant, as the experimenter decided
+  bool fill = false;            ///< the group that the fewest have completed
   std::string advisor;          ///< socket of a program that proposes levels; empty: none
   double advisor_time_out = 1;  ///< s
 };

@@ -16,9 +16,14 @@ session::LimitedForSimulation fit_to_simulation(protocols::Protocol& protocol,
                                                 const participants::SimulatedSettings& simulated) {
   session::LimitedForSimulation limited = session::limit_for_simulation(protocol, simulated);
   std::string reasons;
-  for (const std::string& fault :
-       session::simulation_faults(protocol, StimulusLibrary(protocol), simulated))
-    reasons += "\n" + fault;
+  const auto add_reasons = [&](const protocols::Protocol& shown, const std::string& group) {
+    for (const std::string& fault :
+         session::simulation_faults(shown, StimulusLibrary(shown), simulated))
+      reasons += "\n" + group + fault;
+  };
+  if (!protocol.groups.any()) add_reasons(protocol, "");
+  for (std::size_t i = 0; i < protocol.group_protocols.size(); ++i)
+    add_reasons(*protocol.group_protocols[i], "group '" + protocol.groups.names[i] + "': ");
   if (!reasons.empty()) throw UsageError("this protocol cannot be simulated:" + reasons);
   return limited;
 }

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "data/base/checksum.h"
+#include "protocols/groups.h"
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
 #include "runner/study/task_words.h"
@@ -111,7 +112,8 @@ std::string to_line(const OrderRow& row) {
          (task.catch_trial ? ",1," : ",0,") + std::to_string(task.comparison);
 }
 
-std::string fixed_order(const Protocol& protocol, int participant_number) {
+std::string fixed_order(const Protocol& all, int participant_number) {
+  const Protocol& protocol = protocols::protocol_of(all, participant_number);
   std::string lines;
   for (int session = 1; session <= protocol.sessions.count; ++session)
     lines += session_lines(protocol, participant_number, session);
@@ -122,8 +124,9 @@ std::string order_checksum(const Protocol& protocol, int participant_number) {
   return checksum_hex(fixed_order(protocol, participant_number));
 }
 
-ExpectedTrials expected_trials(const Protocol& protocol, int participant_number,
+ExpectedTrials expected_trials(const Protocol& all, int participant_number,
                                const std::vector<ShownTrial>& shown) {
+  const Protocol& protocol = protocols::protocol_of(all, participant_number);
   ExpectedTrials out;
   out.complete = true;
   for (int session = 1; session <= protocol.sessions.count; ++session) {
@@ -155,7 +158,8 @@ std::string conditions_in_words(const Protocol& protocol) {
   return protocols::study_of_shapes(protocol) ? "renderers" : "blocks";
 }
 
-std::string condition_order(const Protocol& protocol, int participant_number) {
+std::string condition_order(const Protocol& all, int participant_number) {
+  const Protocol& protocol = protocols::protocol_of(all, participant_number);
   std::vector<std::string> names;
   if (protocols::study_of_shapes(protocol)) {
     for (const protocols::Trial& trial : protocols::schedule(protocol, participant_number))

@@ -124,6 +124,10 @@ std::optional<station::RunSettings> parse_run_settings(const std::vector<std::st
        "CODE has withdrawn and asks to take part again; recorded")  //
       ("number", po::value(&number)->value_name("N"),
        "orders the counterbalancing; default: the next unused one")  //
+      ("group", po::value(&settings.group)->value_name("NAME"),
+       "group of a new participant, where the protocol leaves it to you")  //
+      ("fill", po::bool_switch(&settings.fill),
+       "a new participant gets the group that the fewest have completed; recorded")  //
       ("changed-protocol", po::value(&settings.changed_protocol)->value_name("stored|texts"),
        "if the protocol has changed since CODE began: stored (the default) keeps the old one; "
        "texts "

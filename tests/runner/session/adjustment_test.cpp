@@ -47,7 +47,7 @@ Settings simulated(std::uint64_t seed) {
   {
     data::Store store = data::Store::open(file, data::Store::Mode::write_or_create);
     StudyPlan plan;
-    plan.participants = kParticipants;
+    plan.numbers = first_numbers(kParticipants);
     plan.seed = seed;
     progress = simulate_study(protocol, store, participants::load_simulated_settings(""), plan,
                               std::atomic<bool>{}, {});

@@ -24,7 +24,8 @@ class SimulatedSolids : public ::testing::Test {
     data::Store store = data::Store::open(db(), data::Store::Mode::write_or_create);
     const std::atomic<bool> never{false};
     return simulate_study(protocol, store, settings,
-                          {.participants = participants, .seed = 1, .jobs = 1}, never, {});
+                          {.numbers = first_numbers(participants), .seed = 1, .jobs = 1}, never,
+                          {});
   }
   fs::path db() const { return folder_ / "study.db"; }
 

@@ -62,7 +62,7 @@ class SimulatedStudy : public ::testing::Test {
     data::Store store = data::Store::open(db, data::Store::Mode::write_or_create);
     const std::atomic<bool> never{false};
     return simulate_study(protocol, store, settings,
-                          {.participants = 3, .seed = seed, .jobs = jobs}, never, {});
+                          {.numbers = first_numbers(3), .seed = seed, .jobs = jobs}, never, {});
   }
 
   /// Settings with the patch in the text.
@@ -115,7 +115,7 @@ TEST_F(SimulatedStudy, IsTheSameHoweverOftenItIsStopped) {
         });
     const StudyProgress progress =
         simulate_study(p, store, participants::load_simulated_settings(""),
-                       {.participants = 3, .seed = 1, .jobs = 2}, stop, {});
+                       {.numbers = first_numbers(3), .seed = 1, .jobs = 2}, stop, {});
     done = progress.recorded == progress.expected;
     ++stops;
   }

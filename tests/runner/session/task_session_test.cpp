@@ -63,7 +63,7 @@ class TaskSession : public ::testing::Test {
   static void simulate(const protocols::Protocol& protocol, const std::string& database) {
     data::Store store = data::Store::open(database, data::Store::Mode::write_or_create);
     StudyPlan plan;
-    plan.participants = 1;
+    plan.numbers = {1};
     plan.seed = 3;
     const std::atomic<bool> stop{false};
     simulate_study(protocol, store, participants::load_simulated_settings(""), plan, stop, {});

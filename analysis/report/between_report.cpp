@@ -1,0 +1,304 @@
+#include "analysis/report/between_report.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "analysis/statistics/task_analysis.h"
+#include "analysis/text.h"
+
+namespace palpate::analysis {
+namespace {
+
+using GroupJson = nlohmann::ordered_json;
+
+GroupJson maybe(const std::optional<double>& value) {
+  return value && std::isfinite(*value) ? GroupJson(*value) : GroupJson(nullptr);
+}
+
+GroupJson ends_of(const std::optional<Interval>& interval) {
+  return interval ? GroupJson{interval->low, interval->high} : GroupJson(nullptr);
+}
+
+GroupJson effect_json(const GroupEffect& effect) {
+  GroupJson out{{"num_df", maybe(effect.num_df)},
+                {"den_df", maybe(effect.den_df)},
+                {"f", maybe(effect.f)},
+                {"p", maybe(effect.p)},
+                {"generalized_eta_squared", maybe(effect.generalized_eta_squared)}};
+  if (effect.gg_epsilon) {
+    out["gg_epsilon"] = *effect.gg_epsilon;
+    out["gg_p"] = maybe(effect.gg_p);
+  }
+  if (!effect.undefined.empty()) out["reason"] = effect.undefined;
+  return out;
+}
+
+/// The name of a condition; none: the mean over all.
+GroupJson renderer_json(const GroupedMeasure& of, const std::optional<std::size_t>& condition) {
+  return condition ? GroupJson(of.renderers[*condition]) : GroupJson(nullptr);
+}
+
+GroupJson marginal_json(const GroupedMeasure& of, const GroupMarginal& one) {
+  return {{"group", of.groups[one.group]},
+          {"renderer", renderer_json(of, one.condition)},
+          {"n", one.n},
+          {"mean", maybe(one.mean)},
+          {"se", maybe(one.se)},
+          {"ci95", ends_of(one.ci95)}};
+}
+
+GroupJson contrast_json(const GroupedMeasure& of, const GroupContrast& one) {
+  GroupJson out{
+      {"reference", of.groups.front()},
+      {"compared", of.groups[one.group]},
+      {"renderer", renderer_json(of, one.condition)},
+      {"minus_renderer", one.of_difference ? GroupJson(of.renderers.front()) : GroupJson(nullptr)},
+      {"n_reference", one.n_reference},
+      {"n", one.n},
+      {"estimate", maybe(one.estimate)},
+      {"se", maybe(one.se)},
+      {"ci95", ends_of(one.ci95)},
+      {"t", maybe(one.t)},
+      {"df", maybe(one.df)},
+      {"p", maybe(one.p)},
+      {"p_holm", maybe(one.p_holm)}};
+  if (!one.undefined.empty()) out["reason"] = one.undefined;
+  return out;
+}
+
+GroupJson measure_json(const GroupedMeasure& of) {
+  GroupJson out{{"measure", of.measure}, {"task", of.task},           {"block", of.block_name},
+                {"stimulus", of.shape},  {"unit", of.unit},           {"logarithms", of.logarithms},
+                {"groups", of.groups},   {"renderers", of.renderers}, {"n", of.result.anova.n}};
+  if (!of.result.anova.undefined.empty()) out["reason"] = of.result.anova.undefined;
+  out["left_out"] = GroupJson::array();
+  for (const std::size_t row : of.result.dropped) out["left_out"].push_back(of.participants[row]);
+  out["effects"] = GroupJson::object();
+  for (const GroupEffect& effect : of.result.anova.effects)
+    out["effects"][effect.name] = effect_json(effect);
+  out["means"] = GroupJson::array();
+  for (const GroupMarginal& one : of.result.marginals)
+    out["means"].push_back(marginal_json(of, one));
+  out["contrasts"] = GroupJson::array();
+  for (const GroupContrast& one : of.result.contrasts)
+    out["contrasts"].push_back(contrast_json(of, one));
+  return out;
+}
+
+/// "Thresholds of 'stiffness', ball"
+std::string title_of(const GroupedMeasure& of) {
+  std::string out = of.measure == "time"       ? "Identification times"
+                    : of.measure == "accuracy" ? "Accuracy of identification"
+                                               : measure_plural(of.measure);
+  for (const std::string& part : {of.block_name, of.shape}) {
+    if (!part.empty()) out += ", " + printable(part);
+  }
+  return out;
+}
+
+/// On the scale of the figures: of logarithms their exponential.
+std::string shown(const GroupedMeasure& of, const std::optional<double>& value) {
+  return value ? short_number(of.logarithms ? std::exp(*value) : *value) : kMissing;
+}
+
+std::string shown(const GroupedMeasure& of, const std::optional<Interval>& interval) {
+  if (!interval) return kMissing;
+  return "[" + shown(of, std::optional(interval->low)) + ", " +
+         shown(of, std::optional(interval->high)) + "]";
+}
+
+std::string condition_of(const GroupedMeasure& of, const std::optional<std::size_t>& condition) {
+  if (condition) return printable(of.renderers[*condition]);
+  return of.renderers.size() > 1 ? "both or all" : printable(of.renderers.front());
+}
+
+/// "old - young", "old / young", with what is compared.
+std::string contrast_name(const GroupedMeasure& of, const GroupContrast& one) {
+  const std::string pair = printable(of.groups[one.group]) + (of.logarithms ? " / " : " - ") +
+                           printable(of.groups.front());
+  if (!one.of_difference) return pair;
+  return pair + " of " + printable(of.renderers[*one.condition]) + (of.logarithms ? " / " : " - ") +
+         printable(of.renderers.front());
+}
+
+std::string f_text(const GroupEffect& effect) {
+  if (!effect.f) return effect.undefined;
+  std::string text = "F(" + short_number(*effect.num_df) + ", " + short_number(*effect.den_df) +
+                     ") = " + fixed(*effect.f, 2) + ", " + p_phrase(*effect.p);
+  if (effect.gg_p)
+    text += " (Greenhouse-Geisser " + p_phrase(*effect.gg_p) + ", epsilon " +
+            fixed(*effect.gg_epsilon, 2) + ")";
+  if (effect.generalized_eta_squared)
+    text += ", generalised eta squared " + fixed(*effect.generalized_eta_squared, 3);
+  return text;
+}
+
+std::string contrast_text(const GroupedMeasure& of, const GroupContrast& one) {
+  std::string text = contrast_name(of, one);
+  if (!one.of_difference && of.renderers.size() > 1) text += ", " + condition_of(of, one.condition);
+  text += ": " + shown(of, one.estimate) + " " + shown(of, one.ci95);
+  if (!one.t) return text + " (" + one.undefined + ")";
+  text += ", t(" + short_number(*one.df) + ") = " + fixed(*one.t, 2) + ", " + p_phrase(*one.p);
+  if (one.p_holm && of.result.contrasts.size() > 1)
+    text += " (" + p_phrase(*one.p_holm) + " adjusted over " +
+            std::to_string(of.result.contrasts.size()) + " contrasts, Holm)";
+  return text;
+}
+
+std::string with_label(const std::string& caption, const std::string& label) {
+  return label.empty() ? caption : caption + " (" + label + ")";
+}
+
+Table means_table(const GroupedMeasure& of, const std::string& label) {
+  Table out;
+  out.caption = with_label(title_of(of) + " by group", label);
+  out.header = {"Group", "Renderer", "n", of.unit.empty() ? "Mean" : "Mean (" + of.unit + ")",
+                "95 % interval"};
+  out.n_names = 2;
+  for (const GroupMarginal& one : of.result.marginals) {
+    out.rows.push_back({printable(of.groups[one.group]), condition_of(of, one.condition),
+                        std::to_string(one.n), shown(of, one.mean), shown(of, one.ci95)});
+  }
+  if (of.logarithms) out.notes.emplace_back("Geometric means over participants.");
+  if (!of.result.dropped.empty()) {
+    std::string names;
+    for (const std::size_t row : of.result.dropped)
+      names += (names.empty() ? "" : ", ") + printable(of.participants[row]);
+    out.notes.push_back("Without a value in every condition, left out: " + names + ".");
+  }
+  return out;
+}
+
+Table effects_table(const GroupedMeasure& of, const std::string& label) {
+  Table out;
+  out.caption = with_label(title_of(of) + ": mixed analysis of variance", label);
+  out.header = {"Effect", "df", "F", "p", "p (Greenhouse-Geisser)", "Generalised eta squared"};
+  for (const GroupEffect& one : of.result.anova.effects) {
+    out.rows.push_back(
+        {one.name,
+         one.num_df ? short_number(*one.num_df) + ", " + short_number(*one.den_df) : kMissing,
+         number(one.f, 2), p_or_missing(one.p), p_or_missing(one.gg_p),
+         number(one.generalized_eta_squared, 3)});
+    if (!one.undefined.empty()) out.notes.push_back(one.name + ": " + one.undefined + ".");
+  }
+  if (!of.result.anova.undefined.empty()) out.notes.push_back(of.result.anova.undefined + ".");
+  out.notes.emplace_back("Type III: every group counts equally, whatever its size.");
+  return out;
+}
+
+Table contrasts_table(const GroupedMeasure& of, const std::string& label) {
+  Table out;
+  out.caption = with_label(title_of(of) + ": groups compared (Welch's t)", label);
+  out.header = {
+      "Contrast", "Renderer", of.logarithms ? "Ratio" : "Difference", "95 % interval", "t", "df",
+      "p",        "p (Holm)"};
+  out.n_names = 2;
+  for (const GroupContrast& one : of.result.contrasts) {
+    out.rows.push_back(
+        {contrast_name(of, one), one.of_difference ? "" : condition_of(of, one.condition),
+         shown(of, one.estimate), shown(of, one.ci95), number(one.t, 2),
+         one.df ? short_number(*one.df) : kMissing, p_or_missing(one.p), p_or_missing(one.p_holm)});
+    if (!one.undefined.empty())
+      out.notes.push_back(contrast_name(of, one) + ": " + one.undefined + ".");
+  }
+  return out;
+}
+
+}  // namespace
+
+void put_groups(const std::vector<GroupedMeasure>& measures, GroupJson& out) {
+  if (measures.empty()) return;
+  std::vector<std::string> within{"renderer"};
+  for (const GroupedMeasure& one : measures) {
+    if (one.measure == "time") within = {"renderer", "shape"};
+  }
+  out["design"] = {{"between", {"group"}}, {"within", within}, {"groups", measures.front().groups}};
+  out["between_groups"] = GroupJson::array();
+  for (const GroupedMeasure& one : measures) {
+    out["between_groups"].push_back(measure_json(one));
+    GroupJson* place = &out["effects"][one.measure];
+    const bool several = std::ranges::any_of(measures, [&](const GroupedMeasure& other) {
+      return other.measure == one.measure && other.block_name == one.block_name &&
+             other.shape != one.shape;
+    });
+    if (!one.block_name.empty()) place = &(*place)[one.block_name];
+    if (several) place = &(*place)[one.shape];
+    for (const GroupEffect& effect : one.result.anova.effects)
+      (*place)[effect.name] = effect_json(effect);
+  }
+}
+
+std::string groups_text(const std::vector<GroupedMeasure>& measures) {
+  std::string text;
+  for (const GroupedMeasure& one : measures) {
+    text += title_of(one) + " by group";
+    for (std::size_t i = 0; i < one.groups.size(); ++i) {
+      text += (i == 0 ? " (" : ", ") + printable(one.groups[i]) + " " +
+              std::to_string(i < one.result.anova.n.size() ? one.result.anova.n[i] : 0);
+    }
+    text += ")\n";
+    if (!one.result.anova.undefined.empty()) text += "  " + one.result.anova.undefined + "\n";
+    for (const GroupMarginal& mean : one.result.marginals) {
+      text += "  " + printable(one.groups[mean.group]) + ", " + condition_of(one, mean.condition) +
+              ": " + shown(one, mean.mean) + (one.unit.empty() ? "" : " " + one.unit) + " " +
+              shown(one, mean.ci95) + "\n";
+    }
+    for (const GroupEffect& effect : one.result.anova.effects)
+      text += "  " + effect.name + ": " + f_text(effect) + "\n";
+    for (const GroupContrast& contrast : one.result.contrasts)
+      text += "  " + contrast_text(one, contrast) + "\n";
+    text += "\n";
+  }
+  return text;
+}
+
+std::vector<Table> groups_tables(const std::vector<GroupedMeasure>& measures,
+                                 const std::string& label) {
+  std::vector<Table> out;
+  for (const GroupedMeasure& one : measures) {
+    out.push_back(means_table(one, label));
+    out.push_back(effects_table(one, label));
+    out.push_back(contrasts_table(one, label));
+  }
+  return out;
+}
+
+std::string groups_conclusion(const std::vector<GroupedMeasure>& measures) {
+  struct Candidate {
+    const GroupedMeasure* measure;
+    const GroupEffect* effect;
+  };
+  std::vector<Candidate> candidates;
+  std::vector<std::optional<double>> p;
+  for (const GroupedMeasure& one : measures) {
+    for (const GroupEffect& effect : one.result.anova.effects) {
+      if (!effect.name.starts_with("group")) continue;
+      candidates.push_back({&one, &effect});
+      p.push_back(effect.gg_p ? effect.gg_p : effect.p);
+    }
+  }
+  if (candidates.empty()) return "";
+  const auto adjusted = holm(p);
+  std::size_t best = 0;
+  for (std::size_t i = 1; i < adjusted.size(); ++i) {
+    if (adjusted[i] && (!adjusted[best] || *adjusted[i] < *adjusted[best])) best = i;
+  }
+  if (!adjusted[best]) return "The groups cannot be compared.";
+  const std::string what = title_of(*candidates[best].measure);
+  const std::string tests = std::to_string(candidates.size());
+  if (*adjusted[best] >= kAlpha)
+    return "No effect of the group is clear (" + tests + " effects; the least " +
+           p_phrase(*adjusted[best]) + ", Holm).";
+  const std::string& effect = candidates[best].effect->name;
+  if (effect == "group")
+    return what + " differ between groups (" + p_phrase(*adjusted[best]) + " adjusted over " +
+           tests + " effects, Holm).";
+  return what + ": the effect of " + effect.substr(std::string("group:").size()) +
+         " differs between groups (" + p_phrase(*adjusted[best]) + " adjusted over " + tests +
+         " effects, Holm).";
+}
+
+}  // namespace palpate::analysis

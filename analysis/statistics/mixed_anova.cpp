@@ -1,0 +1,156 @@
+#include "analysis/statistics/mixed_anova.h"
+
+#include <Eigen/Dense>
+#include <algorithm>
+#include <boost/math/distributions/fisher_f.hpp>
+#include <cmath>
+
+namespace palpate::analysis {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::RowVectorXd;
+using Eigen::VectorXd;
+
+constexpr double kNoVariance = 1e-10;  // relative to the mean
+
+/// Orthonormal Helmert contrasts of `levels`, one a row.
+MatrixXd contrasts(Index levels) {
+  MatrixXd rows = MatrixXd::Zero(levels - 1, levels);
+  for (Index i = 0; i + 1 < levels; ++i) {
+    const double scale = std::sqrt(static_cast<double>((i + 1) * (i + 2)));
+    rows.row(i).head(i + 1).setConstant(1 / scale);
+    rows(i, i + 1) = -static_cast<double>(i + 1) / scale;
+  }
+  return rows;
+}
+
+MatrixXd kronecker(const MatrixXd& a, const MatrixXd& b) {
+  MatrixXd out(a.rows() * b.rows(), a.cols() * b.cols());
+  for (Index i = 0; i < a.rows(); ++i) {
+    for (Index j = 0; j < a.cols(); ++j)
+      out.block(i * b.rows(), j * b.cols(), b.rows(), b.cols()) = a(i, j) * b;
+  }
+  return out;
+}
+
+/// A set of factors within participants, as a bit each.
+using Subset = std::size_t;
+
+std::string name_of(Subset subset, const std::vector<WithinFactor>& within) {
+  std::string out;
+  for (std::size_t i = 0; i < within.size(); ++i) {
+    if (subset >> i & 1) out += (out.empty() ? "" : ":") + within[i].name;
+  }
+  return out;
+}
+
+/// Orthonormal contrasts of the cells for an effect; of no factor: their mean.
+MatrixXd contrasts_of(Subset subset, const std::vector<WithinFactor>& within) {
+  MatrixXd out = MatrixXd::Ones(1, 1);
+  for (std::size_t i = 0; i < within.size(); ++i) {
+    const auto levels = static_cast<Index>(within[i].levels);
+    out = kronecker(
+        out, subset >> i & 1
+                 ? contrasts(levels)
+                 : MatrixXd::Constant(1, levels, 1 / std::sqrt(static_cast<double>(levels))));
+  }
+  return out;
+}
+
+/// Participants' scores on the contrasts of an effect within them.
+struct Scores {
+  MatrixXd means;     ///< groups x contrasts
+  MatrixXd residual;  ///< contrasts x contrasts, sums of products within groups
+  double ss_error() const { return residual.trace(); }
+};
+
+Scores scores_of(const std::vector<GroupedRow>& rows, const VectorXd& n, const MatrixXd& weights) {
+  Scores out{MatrixXd::Zero(n.size(), weights.rows()),
+             MatrixXd::Zero(weights.rows(), weights.rows())};
+  MatrixXd all(static_cast<Index>(rows.size()), weights.rows());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const Eigen::Map<const VectorXd> values(rows[i].values.data(),
+                                            static_cast<Index>(rows[i].values.size()));
+    all.row(static_cast<Index>(i)) = (weights * values).transpose();
+    out.means.row(static_cast<Index>(rows[i].group)) += all.row(static_cast<Index>(i));
+  }
+  out.means.array().colwise() /= n.array();
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const RowVectorXd rest =
+        all.row(static_cast<Index>(i)) - out.means.row(static_cast<Index>(rows[i].group));
+    out.residual += rest.transpose() * rest;
+  }
+  return out;
+}
+
+double upper_tail(double f, double num_df, double den_df) {
+  return cdf(complement(boost::math::fisher_f(num_df, den_df), f));
+}
+
+/// The hypothesis that these combinations of the group means are 0. \param between  one a row
+GroupEffect test(std::string name, const Scores& scores, const VectorXd& n, double participants,
+                 const MatrixXd& between, double all_error) {
+  GroupEffect out;
+  out.name = std::move(name);
+  const MatrixXd tested = between * scores.means;
+  const MatrixXd spread = between * n.cwiseInverse().asDiagonal() * between.transpose();
+  const double ss = (tested.transpose() * spread.ldlt().solve(tested)).trace();
+  const auto p = static_cast<double>(scores.residual.rows());
+  const double error_df = (participants - static_cast<double>(n.size())) * p;
+  out.num_df = p * static_cast<double>(between.rows());
+  out.den_df = error_df;
+  const double error = scores.ss_error() / error_df;
+  if (std::sqrt(error) <= kNoVariance * std::max(1.0, scores.means.norm())) {
+    out.undefined = "the effect is equal in all participants of a group (no variance)";
+    return out;
+  }
+  out.f = ss / *out.num_df / error;
+  out.p = upper_tail(*out.f, *out.num_df, error_df);
+  out.generalized_eta_squared = ss / (ss + all_error);
+  if (p < 2) return out;
+  const double e =
+      std::min(1.0, std::pow(scores.ss_error(), 2) / (p * scores.residual.squaredNorm()));
+  out.gg_epsilon = e;
+  out.gg_p = upper_tail(*out.f, *out.num_df * e, error_df * e);
+  return out;
+}
+
+}  // namespace
+
+MixedAnova mixed_anova(const std::vector<GroupedRow>& rows, std::size_t groups,
+                       const std::vector<WithinFactor>& within) {
+  MixedAnova out;
+  out.n.assign(groups, 0);
+  for (const GroupedRow& row : rows) ++out.n[row.group];
+  if (groups < 2) out.undefined = "only one group";
+  if (std::ranges::find(out.n, std::size_t{0}) != out.n.end())
+    out.undefined = "a group has no participant with a value in every cell";
+  else if (rows.size() <= groups)
+    out.undefined = "one participant in each group, so no variance within groups";
+  if (!out.undefined.empty()) return out;
+
+  VectorXd n(static_cast<Index>(groups));
+  for (std::size_t i = 0; i < groups; ++i) n(static_cast<Index>(i)) = static_cast<double>(out.n[i]);
+  std::vector<Scores> scores;
+  double all_error = 0;
+  for (Subset subset = 0; subset < Subset{1} << within.size(); ++subset) {
+    scores.push_back(scores_of(rows, n, contrasts_of(subset, within)));
+    all_error += scores.back().ss_error();
+  }
+  const MatrixXd unweighted = MatrixXd::Constant(1, n.size(), 1 / static_cast<double>(groups));
+  for (Subset subset = 0; subset < scores.size(); ++subset) {
+    if (scores[subset].residual.rows() == 0) continue;  // a factor of one level
+    const std::string name = name_of(subset, within);
+    const auto add = [&](const std::string& effect, const MatrixXd& between) {
+      out.effects.push_back(
+          test(effect, scores[subset], n, static_cast<double>(rows.size()), between, all_error));
+    };
+    if (!name.empty()) add(name, unweighted);
+    add(name.empty() ? "group" : "group:" + name, contrasts(n.size()));
+  }
+  return out;
+}
+
+}  // namespace palpate::analysis

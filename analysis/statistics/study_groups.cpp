@@ -1,0 +1,99 @@
+#include "analysis/statistics/study_groups.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <map>
+#include <optional>
+
+#include "analysis/statistics/task_analysis.h"
+
+namespace palpate::analysis {
+namespace {
+
+using Value = std::optional<double> (*)(const ParticipantCell& cell);
+
+std::optional<double> log_time(const ParticipantCell& cell) {
+  return cell.n_used > 0 ? std::optional(cell.mean_log) : std::nullopt;
+}
+
+std::optional<double> share_correct(const ParticipantCell& cell) {
+  if (cell.n_trials == 0) return std::nullopt;
+  return static_cast<double>(cell.n_correct) / static_cast<double>(cell.n_trials);
+}
+
+/// A measure of identification, by renderer and shape.
+GroupedMeasure of_identification(const Analysis& analysis, const GroupLabels& labels, Value value) {
+  GroupedMeasure out;
+  out.groups = labels.names;
+  out.renderers = analysis.table.renderers;
+  const ParticipantCells& cells = analysis.description.participant_cells;
+  std::vector<GroupedFigures> figures;
+  for (std::size_t p = 0; p < analysis.table.participants.size(); ++p) {
+    const std::string& name = analysis.table.participants[p];
+    const auto group = labels.of.find(name);
+    if (group == labels.of.end()) continue;
+    GroupedFigures one{name, group->second, {}};
+    for (const auto& renderer : cells) {
+      for (const auto& shape : renderer) one.values.push_back(value(shape[p]));
+    }
+    out.participants.push_back(name);
+    figures.push_back(std::move(one));
+  }
+  out.result =
+      compare_groups(figures, labels.names.size(),
+                     {{"renderer", out.renderers.size()}, {"shape", analysis.table.shapes.size()}});
+  return out;
+}
+
+/// A measure of a task, by renderer.
+GroupedMeasure of_task(const TaskGroup& group, const GroupLabels& labels) {
+  GroupedMeasure out;
+  out.measure = group.measure;
+  out.task = group.task;
+  out.block_name = group.block_name;
+  out.shape = group.shape;
+  out.unit = group.unit;
+  out.logarithms = group.geometric;
+  out.groups = labels.names;
+  std::vector<GroupedFigures> figures;
+  std::map<std::string, std::size_t> row_of;
+  for (std::size_t r = 0; r < group.renderers.size(); ++r) {
+    out.renderers.push_back(group.renderers[r].renderer);
+    for (const NamedFigure& one : group.renderers[r].participants) {
+      const auto known = labels.of.find(one.participant);
+      if (known == labels.of.end()) continue;
+      const auto [row, is_new] = row_of.emplace(one.participant, figures.size());
+      if (is_new) {
+        figures.push_back({one.participant, known->second,
+                           std::vector<std::optional<double>>(group.renderers.size())});
+        out.participants.push_back(one.participant);
+      }
+      figures[row->second].values[r] = out.logarithms ? std::log(one.value) : one.value;
+    }
+  }
+  out.result = compare_groups(figures, labels.names.size(), {{"renderer", out.renderers.size()}});
+  return out;
+}
+
+}  // namespace
+
+std::vector<GroupedMeasure> between_groups(const StudyAnalysis& analysis) {
+  std::vector<GroupedMeasure> out;
+  const GroupLabels& labels = analysis.table.group_labels;
+  if (labels.names.empty()) return out;
+  if (analysis.identification) {
+    GroupedMeasure& time =
+        out.emplace_back(of_identification(*analysis.identification, labels, log_time));
+    time.measure = "time";
+    time.unit = "s";
+    time.logarithms = true;
+    GroupedMeasure& accuracy =
+        out.emplace_back(of_identification(*analysis.identification, labels, share_correct));
+    accuracy.measure = "accuracy";
+  }
+  for (const TaskGroup& group : analysis.groups) out.push_back(of_task(group, labels));
+  return out;
+}
+
+}  // namespace palpate::analysis

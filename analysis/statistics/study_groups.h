@@ -1,0 +1,30 @@
+#pragma once
+// The measures of a study compared between its groups of participants: times and accuracy of
+// identification, and the figures of each task.
+
+#include <string>
+#include <vector>
+
+#include "analysis/statistics/between_groups.h"
+
+namespace palpate::analysis {
+
+struct StudyAnalysis;
+
+/// A measure by group.
+struct GroupedMeasure {
+  /// "time", "accuracy"; of tasks "pse", "jnd", "threshold", "exponent", "rating", ...
+  std::string measure;
+  std::string task, block_name, shape;    ///< of tasks; "": over all
+  std::string unit;                       ///< of the figures, whatever the scale; "": none
+  bool logarithms = false;                ///< natural logarithms are compared: ratios
+  std::vector<std::string> groups;        ///< the first is the reference
+  std::vector<std::string> renderers;     ///< likewise
+  std::vector<std::string> participants;  ///< of each row
+  BetweenGroups result;
+};
+
+/// Empty: the study has no groups.
+std::vector<GroupedMeasure> between_groups(const StudyAnalysis& analysis);
+
+}  // namespace palpate::analysis

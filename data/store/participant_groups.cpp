@@ -1,0 +1,32 @@
+#include "data/store/participant_groups.h"
+
+#include <algorithm>
+
+#include "data/stored_protocol.h"
+
+namespace palpate::data {
+
+ParticipantGroups::ParticipantGroups(Store& store) {
+  for (const ProtocolInfo& protocol : store.protocols()) {
+    GroupAssignment groups = read_stored_protocol(protocol.text).groups;
+    if (groups.any()) by_protocol_.emplace(protocol.sha256, std::move(groups));
+  }
+}
+
+std::vector<std::string> ParticipantGroups::names() const {
+  std::vector<std::string> out;
+  for (const auto& [sha256, groups] : by_protocol_) {
+    for (const std::string& name : groups.names) {
+      if (std::ranges::find(out, name) == out.end()) out.push_back(name);
+    }
+  }
+  return out;
+}
+
+std::string ParticipantGroups::of(const Participant& participant,
+                                  const std::string& protocol_sha256) const {
+  const auto groups = by_protocol_.find(protocol_sha256);
+  return groups == by_protocol_.end() ? "" : groups->second.name(participant.enrolled_number);
+}
+
+}  // namespace palpate::data

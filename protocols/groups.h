@@ -1,0 +1,20 @@
+#pragma once
+// Groups of participants, as a protocol describes them: their names, who belongs to which
+// (data/base/group_assignment.h), and what differs for a group.
+
+#include <nlohmann/json_fwd.hpp>
+#include <vector>
+
+#include "protocols/json_document.h"
+#include "protocols/protocol.h"
+
+namespace palpate::protocols {
+
+/// Reads the key `groups` into protocol.groups. \return the merge patch (RFC 7396) of each group
+/// on the protocol; empty: there are no groups
+std::vector<nlohmann::json> read_groups(ObjectReader& reader, Protocol& protocol);
+
+/// The protocol that a participant sees: that of their group.
+const Protocol& protocol_of(const Protocol& protocol, int participant_number);
+
+}  // namespace palpate::protocols
