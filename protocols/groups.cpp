@@ -16,7 +16,7 @@ constexpr NumberRange kBlock{1, 100};     // participants of each group
 /// A patch of these would make another study of it.
 constexpr std::array kUntouched = {"groups", "factors", "name", "version", "seed", "cues"};
 
-bool is_name(const std::string& text) {
+bool is_group_name(const std::string& text) {
   return !text.empty() && text.size() <= kLongestName &&
          text.find_first_not_of(
              "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-") ==
@@ -30,7 +30,7 @@ void read_names(ObjectReader& section, GroupAssignment& groups) {
     const json& one = (*list)[i];
     const std::string pointer = child_pointer(section.pointer("names"), i);
     const std::string name = one.is_string() ? one.get<std::string>() : "";
-    if (!is_name(name)) {
+    if (!is_group_name(name)) {
       section.faults().add(pointer, "expected a name of 1 to " + std::to_string(kLongestName) +
                                         " letters, digits and '-'" + found_text(one));
     } else if (groups.find(name) < groups.names.size()) {

@@ -154,7 +154,7 @@ PUBLIC = {
     "runner/sweep": "cluster_folder cluster_job slurm swept_study",
     "runner/evidence/stability": "boundary",
     "runner/evidence": "tick_meters",
-    "runner/commands": "shared/command shared/study_options",
+    "runner/commands": "shared/command",
 }
 
 

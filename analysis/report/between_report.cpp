@@ -14,23 +14,23 @@ namespace {
 
 using GroupJson = nlohmann::ordered_json;
 
-GroupJson maybe(const std::optional<double>& value) {
+GroupJson number_json(const std::optional<double>& value) {
   return value && std::isfinite(*value) ? GroupJson(*value) : GroupJson(nullptr);
 }
 
-GroupJson ends_of(const std::optional<Interval>& interval) {
+GroupJson interval_json(const std::optional<Interval>& interval) {
   return interval ? GroupJson{interval->low, interval->high} : GroupJson(nullptr);
 }
 
-GroupJson effect_json(const GroupEffect& effect) {
-  GroupJson out{{"num_df", maybe(effect.num_df)},
-                {"den_df", maybe(effect.den_df)},
-                {"f", maybe(effect.f)},
-                {"p", maybe(effect.p)},
-                {"generalized_eta_squared", maybe(effect.generalized_eta_squared)}};
+GroupJson group_effect_json(const GroupEffect& effect) {
+  GroupJson out{{"num_df", number_json(effect.num_df)},
+                {"den_df", number_json(effect.den_df)},
+                {"f", number_json(effect.f)},
+                {"p", number_json(effect.p)},
+                {"generalized_eta_squared", number_json(effect.generalized_eta_squared)}};
   if (effect.gg_epsilon) {
     out["gg_epsilon"] = *effect.gg_epsilon;
-    out["gg_p"] = maybe(effect.gg_p);
+    out["gg_p"] = number_json(effect.gg_p);
   }
   if (!effect.undefined.empty()) out["reason"] = effect.undefined;
   return out;
@@ -45,9 +45,9 @@ GroupJson marginal_json(const GroupedMeasure& of, const GroupMarginal& one) {
   return {{"group", of.groups[one.group]},
           {"renderer", renderer_json(of, one.condition)},
           {"n", one.n},
-          {"mean", maybe(one.mean)},
-          {"se", maybe(one.se)},
-          {"ci95", ends_of(one.ci95)}};
+          {"mean", number_json(one.mean)},
+          {"se", number_json(one.se)},
+          {"ci95", interval_json(one.ci95)}};
 }
 
 GroupJson contrast_json(const GroupedMeasure& of, const GroupContrast& one) {
@@ -58,13 +58,13 @@ GroupJson contrast_json(const GroupedMeasure& of, const GroupContrast& one) {
       {"minus_renderer", one.of_difference ? GroupJson(of.renderers.front()) : GroupJson(nullptr)},
       {"n_reference", one.n_reference},
       {"n", one.n},
-      {"estimate", maybe(one.estimate)},
-      {"se", maybe(one.se)},
-      {"ci95", ends_of(one.ci95)},
-      {"t", maybe(one.t)},
-      {"df", maybe(one.df)},
-      {"p", maybe(one.p)},
-      {"p_holm", maybe(one.p_holm)}};
+      {"estimate", number_json(one.estimate)},
+      {"se", number_json(one.se)},
+      {"ci95", interval_json(one.ci95)},
+      {"t", number_json(one.t)},
+      {"df", number_json(one.df)},
+      {"p", number_json(one.p)},
+      {"p_holm", number_json(one.p_holm)}};
   if (!one.undefined.empty()) out["reason"] = one.undefined;
   return out;
 }
@@ -78,7 +78,7 @@ GroupJson measure_json(const GroupedMeasure& of) {
   for (const std::size_t row : of.result.dropped) out["left_out"].push_back(of.participants[row]);
   out["effects"] = GroupJson::object();
   for (const GroupEffect& effect : of.result.anova.effects)
-    out["effects"][effect.name] = effect_json(effect);
+    out["effects"][effect.name] = group_effect_json(effect);
   out["means"] = GroupJson::array();
   for (const GroupMarginal& one : of.result.marginals)
     out["means"].push_back(marginal_json(of, one));
@@ -100,14 +100,14 @@ std::string title_of(const GroupedMeasure& of) {
 }
 
 /// On the scale of the figures: of logarithms their exponential.
-std::string shown(const GroupedMeasure& of, const std::optional<double>& value) {
+std::string on_scale(const GroupedMeasure& of, const std::optional<double>& value) {
   return value ? short_number(of.logarithms ? std::exp(*value) : *value) : kMissing;
 }
 
-std::string shown(const GroupedMeasure& of, const std::optional<Interval>& interval) {
+std::string on_scale(const GroupedMeasure& of, const std::optional<Interval>& interval) {
   if (!interval) return kMissing;
-  return "[" + shown(of, std::optional(interval->low)) + ", " +
-         shown(of, std::optional(interval->high)) + "]";
+  return "[" + on_scale(of, std::optional(interval->low)) + ", " +
+         on_scale(of, std::optional(interval->high)) + "]";
 }
 
 std::string condition_of(const GroupedMeasure& of, const std::optional<std::size_t>& condition) {
@@ -116,7 +116,7 @@ std::string condition_of(const GroupedMeasure& of, const std::optional<std::size
 }
 
 /// "old - young", "old / young", with what is compared.
-std::string contrast_name(const GroupedMeasure& of, const GroupContrast& one) {
+std::string group_contrast_name(const GroupedMeasure& of, const GroupContrast& one) {
   const std::string pair = printable(of.groups[one.group]) + (of.logarithms ? " / " : " - ") +
                            printable(of.groups.front());
   if (!one.of_difference) return pair;
@@ -124,7 +124,7 @@ std::string contrast_name(const GroupedMeasure& of, const GroupContrast& one) {
          printable(of.renderers.front());
 }
 
-std::string f_text(const GroupEffect& effect) {
+std::string f_test_text(const GroupEffect& effect) {
   if (!effect.f) return effect.undefined;
   std::string text = "F(" + short_number(*effect.num_df) + ", " + short_number(*effect.den_df) +
                      ") = " + fixed(*effect.f, 2) + ", " + p_phrase(*effect.p);
@@ -136,10 +136,10 @@ std::string f_text(const GroupEffect& effect) {
   return text;
 }
 
-std::string contrast_text(const GroupedMeasure& of, const GroupContrast& one) {
-  std::string text = contrast_name(of, one);
+std::string group_contrast_text(const GroupedMeasure& of, const GroupContrast& one) {
+  std::string text = group_contrast_name(of, one);
   if (!one.of_difference && of.renderers.size() > 1) text += ", " + condition_of(of, one.condition);
-  text += ": " + shown(of, one.estimate) + " " + shown(of, one.ci95);
+  text += ": " + on_scale(of, one.estimate) + " " + on_scale(of, one.ci95);
   if (!one.t) return text + " (" + one.undefined + ")";
   text += ", t(" + short_number(*one.df) + ") = " + fixed(*one.t, 2) + ", " + p_phrase(*one.p);
   if (one.p_holm && of.result.contrasts.size() > 1)
@@ -148,19 +148,19 @@ std::string contrast_text(const GroupedMeasure& of, const GroupContrast& one) {
   return text;
 }
 
-std::string with_label(const std::string& caption, const std::string& label) {
+std::string group_caption(const std::string& caption, const std::string& label) {
   return label.empty() ? caption : caption + " (" + label + ")";
 }
 
-Table means_table(const GroupedMeasure& of, const std::string& label) {
+Table group_means_table(const GroupedMeasure& of, const std::string& label) {
   Table out;
-  out.caption = with_label(title_of(of) + " by group", label);
+  out.caption = group_caption(title_of(of) + " by group", label);
   out.header = {"Group", "Renderer", "n", of.unit.empty() ? "Mean" : "Mean (" + of.unit + ")",
                 "95 % interval"};
   out.n_names = 2;
   for (const GroupMarginal& one : of.result.marginals) {
     out.rows.push_back({printable(of.groups[one.group]), condition_of(of, one.condition),
-                        std::to_string(one.n), shown(of, one.mean), shown(of, one.ci95)});
+                        std::to_string(one.n), on_scale(of, one.mean), on_scale(of, one.ci95)});
   }
   if (of.logarithms) out.notes.emplace_back("Geometric means over participants.");
   if (!of.result.dropped.empty()) {
@@ -172,9 +172,9 @@ Table means_table(const GroupedMeasure& of, const std::string& label) {
   return out;
 }
 
-Table effects_table(const GroupedMeasure& of, const std::string& label) {
+Table group_effects_table(const GroupedMeasure& of, const std::string& label) {
   Table out;
-  out.caption = with_label(title_of(of) + ": mixed analysis of variance", label);
+  out.caption = group_caption(title_of(of) + ": mixed analysis of variance", label);
   out.header = {"Effect", "df", "F", "p", "p (Greenhouse-Geisser)", "Generalised eta squared"};
   for (const GroupEffect& one : of.result.anova.effects) {
     out.rows.push_back(
@@ -189,20 +189,20 @@ Table effects_table(const GroupedMeasure& of, const std::string& label) {
   return out;
 }
 
-Table contrasts_table(const GroupedMeasure& of, const std::string& label) {
+Table group_contrasts_table(const GroupedMeasure& of, const std::string& label) {
   Table out;
-  out.caption = with_label(title_of(of) + ": groups compared (Welch's t)", label);
+  out.caption = group_caption(title_of(of) + ": groups compared (Welch's t)", label);
   out.header = {
       "Contrast", "Renderer", of.logarithms ? "Ratio" : "Difference", "95 % interval", "t", "df",
       "p",        "p (Holm)"};
   out.n_names = 2;
   for (const GroupContrast& one : of.result.contrasts) {
     out.rows.push_back(
-        {contrast_name(of, one), one.of_difference ? "" : condition_of(of, one.condition),
-         shown(of, one.estimate), shown(of, one.ci95), number(one.t, 2),
+        {group_contrast_name(of, one), one.of_difference ? "" : condition_of(of, one.condition),
+         on_scale(of, one.estimate), on_scale(of, one.ci95), number(one.t, 2),
          one.df ? short_number(*one.df) : kMissing, p_or_missing(one.p), p_or_missing(one.p_holm)});
     if (!one.undefined.empty())
-      out.notes.push_back(contrast_name(of, one) + ": " + one.undefined + ".");
+      out.notes.push_back(group_contrast_name(of, one) + ": " + one.undefined + ".");
   }
   return out;
 }
@@ -227,7 +227,7 @@ void put_groups(const std::vector<GroupedMeasure>& measures, GroupJson& out) {
     if (!one.block_name.empty()) place = &(*place)[one.block_name];
     if (several) place = &(*place)[one.shape];
     for (const GroupEffect& effect : one.result.anova.effects)
-      (*place)[effect.name] = effect_json(effect);
+      (*place)[effect.name] = group_effect_json(effect);
   }
 }
 
@@ -243,13 +243,13 @@ std::string groups_text(const std::vector<GroupedMeasure>& measures) {
     if (!one.result.anova.undefined.empty()) text += "  " + one.result.anova.undefined + "\n";
     for (const GroupMarginal& mean : one.result.marginals) {
       text += "  " + printable(one.groups[mean.group]) + ", " + condition_of(one, mean.condition) +
-              ": " + shown(one, mean.mean) + (one.unit.empty() ? "" : " " + one.unit) + " " +
-              shown(one, mean.ci95) + "\n";
+              ": " + on_scale(one, mean.mean) + (one.unit.empty() ? "" : " " + one.unit) + " " +
+              on_scale(one, mean.ci95) + "\n";
     }
     for (const GroupEffect& effect : one.result.anova.effects)
-      text += "  " + effect.name + ": " + f_text(effect) + "\n";
+      text += "  " + effect.name + ": " + f_test_text(effect) + "\n";
     for (const GroupContrast& contrast : one.result.contrasts)
-      text += "  " + contrast_text(one, contrast) + "\n";
+      text += "  " + group_contrast_text(one, contrast) + "\n";
     text += "\n";
   }
   return text;
@@ -259,9 +259,9 @@ std::vector<Table> groups_tables(const std::vector<GroupedMeasure>& measures,
                                  const std::string& label) {
   std::vector<Table> out;
   for (const GroupedMeasure& one : measures) {
-    out.push_back(means_table(one, label));
-    out.push_back(effects_table(one, label));
-    out.push_back(contrasts_table(one, label));
+    out.push_back(group_means_table(one, label));
+    out.push_back(group_effects_table(one, label));
+    out.push_back(group_contrasts_table(one, label));
   }
   return out;
 }

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "analysis/statistics/anova.h"
 #include "analysis/statistics/describe.h"
 
 namespace palpate::analysis {
@@ -20,21 +21,21 @@ double mean_of_cells(const GroupedRow& row, std::size_t first, std::size_t count
 }
 
 /// What of a participant is compared.
-struct Figure {
+struct Compared {
   std::optional<std::size_t> condition;  ///< none: the mean over all cells
   bool of_difference = false;
 };
 
 /// Values of a group's participants. \param conditions  levels of the first factor
-std::vector<double> values_of(const std::vector<GroupedRow>& rows, std::size_t group,
-                              const Figure& figure, std::size_t conditions) {
+std::vector<double> compared_values(const std::vector<GroupedRow>& rows, std::size_t group,
+                                    const Compared& what, std::size_t conditions) {
   std::vector<double> out;
   for (const GroupedRow& row : rows) {
     if (row.group != group) continue;
     const std::size_t cells = row.values.size(), of_one = cells / conditions;
-    double value = figure.condition ? mean_of_cells(row, *figure.condition * of_one, of_one)
-                                    : mean_of_cells(row, 0, cells);
-    if (figure.of_difference) value -= mean_of_cells(row, 0, of_one);
+    double value = what.condition ? mean_of_cells(row, *what.condition * of_one, of_one)
+                                  : mean_of_cells(row, 0, cells);
+    if (what.of_difference) value -= mean_of_cells(row, 0, of_one);
     out.push_back(value);
   }
   return out;
@@ -54,7 +55,7 @@ GroupMarginal marginal(const std::vector<double>& values) {
   return out;
 }
 
-void adjust(std::vector<GroupContrast>& contrasts) {
+void adjust_contrasts(std::vector<GroupContrast>& contrasts) {
   std::vector<std::optional<double>> p;
   for (const GroupContrast& one : contrasts) p.push_back(one.p);
   const auto adjusted = holm(p);
@@ -79,7 +80,6 @@ GroupContrast welch(const std::vector<double>& reference, const std::vector<doub
   }
   const auto m = static_cast<double>(reference.size()), n = static_cast<double>(other.size());
   const double va = *a * *a / m, vb = *b * *b / n;
-  constexpr double kNoVariance = 1e-10;  // relative to the mean
   if (std::sqrt(va + vb) <= kNoVariance * std::max(1.0, std::fabs(mean(reference)))) {
     out.undefined = "all participants of a group are equal (no variance)";
     return out;
@@ -109,27 +109,28 @@ BetweenGroups compare_groups(const std::vector<GroupedFigures>& figures, std::si
   }
   out.anova = mixed_anova(rows, groups, within);
   const std::size_t conditions = within.empty() ? 1 : within.front().levels;
-  std::vector<Figure> compared{{}};
+  std::vector<Compared> compared{{}};
   for (std::size_t c = 0; conditions > 1 && c < conditions; ++c) compared.push_back({c, false});
   for (std::size_t group = 0; group < groups; ++group) {
-    for (const Figure& one : compared) {
+    for (const Compared& one : compared) {
       GroupMarginal& made =
-          out.marginals.emplace_back(marginal(values_of(rows, group, one, conditions)));
+          out.marginals.emplace_back(marginal(compared_values(rows, group, one, conditions)));
       made.group = group;
       made.condition = one.condition;
     }
   }
   for (std::size_t c = 1; c < conditions; ++c) compared.push_back({c, true});
   for (std::size_t group = 1; group < groups; ++group) {
-    for (const Figure& one : compared) {
-      GroupContrast& made = out.contrasts.emplace_back(
-          welch(values_of(rows, 0, one, conditions), values_of(rows, group, one, conditions)));
+    for (const Compared& one : compared) {
+      GroupContrast& made =
+          out.contrasts.emplace_back(welch(compared_values(rows, 0, one, conditions),
+                                           compared_values(rows, group, one, conditions)));
       made.group = group;
       made.condition = one.condition;
       made.of_difference = one.of_difference;
     }
   }
-  adjust(out.contrasts);
+  adjust_contrasts(out.contrasts);
   return out;
 }
 

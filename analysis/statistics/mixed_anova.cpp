@@ -2,8 +2,9 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
-#include <boost/math/distributions/fisher_f.hpp>
 #include <cmath>
+
+#include "analysis/statistics/anova.h"
 
 namespace palpate::analysis {
 namespace {
@@ -12,19 +13,6 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::RowVectorXd;
 using Eigen::VectorXd;
-
-constexpr double kNoVariance = 1e-10;  // relative to the mean
-
-/// Orthonormal Helmert contrasts of `levels`, one a row.
-MatrixXd contrasts(Index levels) {
-  MatrixXd rows = MatrixXd::Zero(levels - 1, levels);
-  for (Index i = 0; i + 1 < levels; ++i) {
-    const double scale = std::sqrt(static_cast<double>((i + 1) * (i + 2)));
-    rows.row(i).head(i + 1).setConstant(1 / scale);
-    rows(i, i + 1) = -static_cast<double>(i + 1) / scale;
-  }
-  return rows;
-}
 
 MatrixXd kronecker(const MatrixXd& a, const MatrixXd& b) {
   MatrixXd out(a.rows() * b.rows(), a.cols() * b.cols());
@@ -51,24 +39,22 @@ MatrixXd contrasts_of(Subset subset, const std::vector<WithinFactor>& within) {
   MatrixXd out = MatrixXd::Ones(1, 1);
   for (std::size_t i = 0; i < within.size(); ++i) {
     const auto levels = static_cast<Index>(within[i].levels);
-    out = kronecker(
-        out, subset >> i & 1
-                 ? contrasts(levels)
-                 : MatrixXd::Constant(1, levels, 1 / std::sqrt(static_cast<double>(levels))));
+    out = kronecker(out, subset >> i & 1 ? helmert_contrasts(levels) : unit_average(levels));
   }
   return out;
 }
 
 /// Participants' scores on the contrasts of an effect within them.
-struct Scores {
+struct GroupScores {
   MatrixXd means;     ///< groups x contrasts
   MatrixXd residual;  ///< contrasts x contrasts, sums of products within groups
   double ss_error() const { return residual.trace(); }
 };
 
-Scores scores_of(const std::vector<GroupedRow>& rows, const VectorXd& n, const MatrixXd& weights) {
-  Scores out{MatrixXd::Zero(n.size(), weights.rows()),
-             MatrixXd::Zero(weights.rows(), weights.rows())};
+GroupScores group_scores(const std::vector<GroupedRow>& rows, const VectorXd& n,
+                         const MatrixXd& weights) {
+  GroupScores out{MatrixXd::Zero(n.size(), weights.rows()),
+                  MatrixXd::Zero(weights.rows(), weights.rows())};
   MatrixXd all(static_cast<Index>(rows.size()), weights.rows());
   for (std::size_t i = 0; i < rows.size(); ++i) {
     const Eigen::Map<const VectorXd> values(rows[i].values.data(),
@@ -85,13 +71,9 @@ Scores scores_of(const std::vector<GroupedRow>& rows, const VectorXd& n, const M
   return out;
 }
 
-double upper_tail(double f, double num_df, double den_df) {
-  return cdf(complement(boost::math::fisher_f(num_df, den_df), f));
-}
-
 /// The hypothesis that these combinations of the group means are 0. \param between  one a row
-GroupEffect test(std::string name, const Scores& scores, const VectorXd& n, double participants,
-                 const MatrixXd& between, double all_error) {
+GroupEffect effect_of(std::string name, const GroupScores& scores, const VectorXd& n,
+                      double participants, const MatrixXd& between, double all_error) {
   GroupEffect out;
   out.name = std::move(name);
   const MatrixXd tested = between * scores.means;
@@ -107,13 +89,13 @@ GroupEffect test(std::string name, const Scores& scores, const VectorXd& n, doub
     return out;
   }
   out.f = ss / *out.num_df / error;
-  out.p = upper_tail(*out.f, *out.num_df, error_df);
+  out.p = f_upper_tail(*out.f, *out.num_df, error_df);
   out.generalized_eta_squared = ss / (ss + all_error);
   if (p < 2) return out;
   const double e =
       std::min(1.0, std::pow(scores.ss_error(), 2) / (p * scores.residual.squaredNorm()));
   out.gg_epsilon = e;
-  out.gg_p = upper_tail(*out.f, *out.num_df * e, error_df * e);
+  out.gg_p = f_upper_tail(*out.f, *out.num_df * e, error_df * e);
   return out;
 }
 
@@ -133,10 +115,10 @@ MixedAnova mixed_anova(const std::vector<GroupedRow>& rows, std::size_t groups,
 
   VectorXd n(static_cast<Index>(groups));
   for (std::size_t i = 0; i < groups; ++i) n(static_cast<Index>(i)) = static_cast<double>(out.n[i]);
-  std::vector<Scores> scores;
+  std::vector<GroupScores> scores;
   double all_error = 0;
   for (Subset subset = 0; subset < Subset{1} << within.size(); ++subset) {
-    scores.push_back(scores_of(rows, n, contrasts_of(subset, within)));
+    scores.push_back(group_scores(rows, n, contrasts_of(subset, within)));
     all_error += scores.back().ss_error();
   }
   const MatrixXd unweighted = MatrixXd::Constant(1, n.size(), 1 / static_cast<double>(groups));
@@ -144,11 +126,11 @@ MixedAnova mixed_anova(const std::vector<GroupedRow>& rows, std::size_t groups,
     if (scores[subset].residual.rows() == 0) continue;  // a factor of one level
     const std::string name = name_of(subset, within);
     const auto add = [&](const std::string& effect, const MatrixXd& between) {
-      out.effects.push_back(
-          test(effect, scores[subset], n, static_cast<double>(rows.size()), between, all_error));
+      out.effects.push_back(effect_of(effect, scores[subset], n, static_cast<double>(rows.size()),
+                                      between, all_error));
     };
     if (!name.empty()) add(name, unweighted);
-    add(name.empty() ? "group" : "group:" + name, contrasts(n.size()));
+    add(name.empty() ? "group" : "group:" + name, helmert_contrasts(n.size()));
   }
   return out;
 }

@@ -3,7 +3,6 @@
 #include <Eigen/Dense>
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
-#include <boost/math/distributions/fisher_f.hpp>
 #include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
@@ -13,6 +12,7 @@
 #include <tuple>
 #include <utility>
 
+#include "analysis/statistics/anova.h"
 #include "analysis/statistics/reml.h"
 
 namespace palpate::analysis {
@@ -23,25 +23,9 @@ using Eigen::MatrixXd;
 using Eigen::RowVectorXd;
 using Eigen::VectorXd;
 
-constexpr double kNoVariance = 1e-10;  // relative to the mean, as for the paired tests
-constexpr double kRounding = 1e-10;    // relative, of epsilons and eigenvalues
+constexpr double kRounding = 1e-10;  // relative, of epsilons and eigenvalues
 
 constexpr const char* kFlat = "the effect is equal in all participants (no variance)";
-
-/// Orthonormal Helmert contrasts of `levels`, one a row, each summing to 0.
-MatrixXd contrasts(Index levels) {
-  MatrixXd rows = MatrixXd::Zero(levels - 1, levels);
-  for (Index i = 0; i + 1 < levels; ++i) {
-    const auto before = static_cast<double>(i + 1);
-    rows.row(i).head(i + 1).setConstant(1 / std::sqrt(before * (before + 1)));
-    rows(i, i + 1) = -before / std::sqrt(before * (before + 1));
-  }
-  return rows;
-}
-
-MatrixXd average(Index levels) {
-  return MatrixXd::Constant(1, levels, 1 / std::sqrt(static_cast<double>(levels)));
-}
 
 /// Participants' scores on an effect's contrasts, split into their mean and the deviations from it.
 struct Scores {
@@ -68,10 +52,6 @@ Scores score(const MatrixXd& cells, const MatrixXd& of_renderer, const MatrixXd&
   out.ss = static_cast<double>(n) * out.mean.squaredNorm();
   out.ss_error = out.rest.squaredNorm();
   return out;
-}
-
-double f_upper_tail(double f, double num_df, double den_df) {
-  return cdf(complement(boost::math::fisher_f(num_df, den_df), f));
 }
 
 /// Mauchly's W from the eigenvalues of the contrasts' scatter matrix. \param df n - 1
@@ -377,10 +357,11 @@ RmAnova rm_anova(const ParticipantCells& participant_cells) {
     }
   }
   const auto renderers = static_cast<Index>(n_renderers), shapes = static_cast<Index>(n_shapes);
-  const std::array<Scores, 3> scores{score(cells, contrasts(renderers), average(shapes)),
-                                     score(cells, average(renderers), contrasts(shapes)),
-                                     score(cells, contrasts(renderers), contrasts(shapes))};
-  double all_error = score(cells, average(renderers), average(shapes)).ss_error;
+  const std::array<Scores, 3> scores{
+      score(cells, helmert_contrasts(renderers), unit_average(shapes)),
+      score(cells, unit_average(renderers), helmert_contrasts(shapes)),
+      score(cells, helmert_contrasts(renderers), helmert_contrasts(shapes))};
+  double all_error = score(cells, unit_average(renderers), unit_average(shapes)).ss_error;
   for (const Scores& effect : scores) all_error += effect.ss_error;
   for (std::size_t i = 0; i < scores.size(); ++i) {
     if (scores[i].rest.cols() == 0) {

@@ -11,7 +11,7 @@
 namespace palpate::analysis {
 namespace {
 
-using Value = std::optional<double> (*)(const ParticipantCell& cell);
+using CellValue = std::optional<double> (*)(const ParticipantCell& cell);
 
 std::optional<double> log_time(const ParticipantCell& cell) {
   return cell.n_used > 0 ? std::optional(cell.mean_log) : std::nullopt;
@@ -23,7 +23,8 @@ std::optional<double> share_correct(const ParticipantCell& cell) {
 }
 
 /// A measure of identification, by renderer and shape.
-GroupedMeasure of_identification(const Analysis& analysis, const GroupLabels& labels, Value value) {
+GroupedMeasure identification_by_group(const Analysis& analysis, const GroupLabels& labels,
+                                       CellValue value) {
   GroupedMeasure out;
   out.groups = labels.names;
   out.renderers = analysis.table.renderers;
@@ -47,7 +48,7 @@ GroupedMeasure of_identification(const Analysis& analysis, const GroupLabels& la
 }
 
 /// A measure of a task, by renderer.
-GroupedMeasure of_task(const TaskGroup& group, const GroupLabels& labels) {
+GroupedMeasure task_by_group(const TaskGroup& group, const GroupLabels& labels) {
   GroupedMeasure out;
   out.measure = group.measure;
   out.task = group.task;
@@ -84,15 +85,15 @@ std::vector<GroupedMeasure> between_groups(const StudyAnalysis& analysis) {
   if (labels.names.empty()) return out;
   if (analysis.identification) {
     GroupedMeasure& time =
-        out.emplace_back(of_identification(*analysis.identification, labels, log_time));
+        out.emplace_back(identification_by_group(*analysis.identification, labels, log_time));
     time.measure = "time";
     time.unit = "s";
     time.logarithms = true;
     GroupedMeasure& accuracy =
-        out.emplace_back(of_identification(*analysis.identification, labels, share_correct));
+        out.emplace_back(identification_by_group(*analysis.identification, labels, share_correct));
     accuracy.measure = "accuracy";
   }
-  for (const TaskGroup& group : analysis.groups) out.push_back(of_task(group, labels));
+  for (const TaskGroup& group : analysis.groups) out.push_back(task_by_group(group, labels));
   return out;
 }
 
