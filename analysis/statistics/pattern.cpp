@@ -344,8 +344,8 @@ using Kind = Node::Kind;
 
 using Value = std::function<double(std::size_t)>;
 
-double number_of(const Node& node, const Value& value) {
-  const auto part = [&](std::size_t i) { return number_of(node.parts[i], value); };
+double node_number(const Node& node, const Value& value) {
+  const auto part = [&](std::size_t i) { return node_number(node.parts[i], value); };
   switch (node.kind) {
     case Kind::column:
       return value(node.column);
@@ -376,18 +376,18 @@ double number_of(const Node& node, const Value& value) {
   }
 }
 
-std::optional<bool> truth_of(const Node& node, const Value& value) {
+std::optional<bool> node_truth(const Node& node, const Value& value) {
   if (node.kind == Kind::opposite) {
-    const auto part = truth_of(node.parts[0], value);
+    const auto part = node_truth(node.parts[0], value);
     return part ? std::optional(!*part) : std::nullopt;
   }
   if (node.kind == Kind::both || node.kind == Kind::either) {
     const bool decisive = node.kind == Kind::either;
-    const auto a = truth_of(node.parts[0], value), b = truth_of(node.parts[1], value);
+    const auto a = node_truth(node.parts[0], value), b = node_truth(node.parts[1], value);
     if (a == decisive || b == decisive) return decisive;
     return a && b ? std::optional(!decisive) : std::nullopt;
   }
-  const double a = number_of(node.parts[0], value), b = number_of(node.parts[1], value);
+  const double a = node_number(node.parts[0], value), b = node_number(node.parts[1], value);
   if (std::isnan(a) || std::isnan(b)) return std::nullopt;
   switch (node.kind) {
     case Kind::less:
@@ -427,7 +427,7 @@ Pattern& Pattern::operator=(Pattern&&) noexcept = default;
 Pattern::~Pattern() = default;
 
 std::optional<bool> Pattern::holds(const std::function<double(std::size_t)>& value) const {
-  return truth_of(*root_, value);
+  return node_truth(*root_, value);
 }
 
 }  // namespace palpate::analysis

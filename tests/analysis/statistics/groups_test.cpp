@@ -1,0 +1,185 @@
+// Groups between participants against R (fixtures/make_groups.R) and closed forms.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "analysis/statistics/between_groups.h"
+#include "analysis/statistics/mixed_anova.h"
+#include "data/base/random.h"
+
+namespace palpate::analysis {
+namespace {
+
+using GroupsJson = nlohmann::json;
+
+GroupsJson fixture() {
+  return GroupsJson::parse(
+      std::ifstream(PALPATE_SOURCE_DIR "/tests/analysis/fixtures/groups.json"));
+}
+
+std::vector<GroupedRow> rows_of(const GroupsJson& study) {
+  std::vector<GroupedRow> rows;
+  for (std::size_t i = 0; i < study["group"].size(); ++i)
+    rows.push_back({study["group"][i], study["values"][i].get<std::vector<double>>()});
+  return rows;
+}
+
+std::vector<WithinFactor> within_of(const GroupsJson& study) {
+  std::vector<WithinFactor> within{{"renderer", study["renderers"]}};
+  if (study["shapes"] > 1) within.push_back({"shape", study["shapes"]});
+  return within;
+}
+
+void expect_near(const std::optional<double>& found, const GroupsJson& expected) {
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(*found, expected.get<double>(),
+              1e-8 * std::max(1.0, std::fabs(expected.get<double>())));
+}
+
+TEST(MixedAnova, AgreesWithAfexOnUnbalancedGroups) {
+  std::size_t corrected = 0;
+  for (const auto& study : fixture()["cases"]) {
+    const MixedAnova anova = mixed_anova(rows_of(study), study["groups"], within_of(study));
+    ASSERT_EQ(anova.effects.size(), study["effects"].size());
+    for (std::size_t i = 0; i < anova.effects.size(); ++i) {
+      const GroupEffect& found = anova.effects[i];
+      const auto& expected = study["effects"][i];
+      SCOPED_TRACE(found.name);
+      EXPECT_EQ(found.name, expected["name"]);
+      expect_near(found.num_df, expected["num_df"]);
+      expect_near(found.den_df, expected["den_df"]);
+      expect_near(found.f, expected["f"]);
+      expect_near(found.p, expected["p"]);
+      expect_near(found.generalized_eta_squared, expected["ges"]);
+      if (!expected.contains("gg_epsilon") || !expected["gg_epsilon"].is_number()) continue;
+      expect_near(found.gg_epsilon, expected["gg_epsilon"]);
+      expect_near(found.gg_p, expected["gg_p"]);
+      ++corrected;
+    }
+  }
+  EXPECT_GT(corrected, 20U);
+}
+
+std::vector<GroupedFigures> figures_of(const std::vector<GroupedRow>& rows) {
+  std::vector<GroupedFigures> out;
+  for (const GroupedRow& row : rows)
+    out.push_back(
+        {"P" + std::to_string(out.size()), row.group, {row.values.begin(), row.values.end()}});
+  return out;
+}
+
+TEST(BetweenGroups, AgreesWithEmmeansAndWelch) {
+  for (const auto& study : fixture()["cases"]) {
+    const BetweenGroups found =
+        compare_groups(figures_of(rows_of(study)), study["groups"], within_of(study));
+    for (const GroupMarginal& one : found.marginals) {
+      if (!one.condition) expect_near(one.mean, study["emmeans"][one.group]);
+    }
+    const GroupContrast& first = found.contrasts.front();
+    expect_near(first.t, study["welch"]["t"]);
+    expect_near(first.df, study["welch"]["df"]);
+    expect_near(first.p, study["welch"]["p"]);
+    expect_near(first.ci95->low, study["welch"]["low"]);
+    expect_near(first.ci95->high, study["welch"]["high"]);
+  }
+}
+
+std::vector<GroupedRow> drawn(Random& random, std::vector<std::size_t> sizes, std::size_t cells) {
+  std::vector<GroupedRow> rows;
+  for (std::size_t group = 0; group < sizes.size(); ++group) {
+    for (std::size_t i = 0; i < sizes[group]; ++i) {
+      GroupedRow row{group, {}};
+      const double own = random.normal();
+      for (std::size_t c = 0; c < cells; ++c) row.values.push_back(own + random.normal());
+      rows.push_back(row);
+    }
+  }
+  return rows;
+}
+
+const GroupEffect& effect(const MixedAnova& anova, const std::string& name) {
+  return *std::ranges::find(anova.effects, name, &GroupEffect::name);
+}
+
+/// With two conditions the interaction is the pooled t test of participants' differences.
+TEST(MixedAnova, InteractionIsSquaredT) {
+  for (const std::uint64_t seed : {1U, 2U}) {
+    Random random(seed);
+    const std::vector<GroupedRow> rows = drawn(random, {9, 9}, 2);
+    double mean[2] = {}, squares = 0;
+    for (const GroupedRow& row : rows) mean[row.group] += (row.values[1] - row.values[0]) / 9;
+    for (const GroupedRow& row : rows)
+      squares += std::pow(row.values[1] - row.values[0] - mean[row.group], 2);
+    const double t = (mean[1] - mean[0]) / std::sqrt(squares / 16 * 2 / 9);
+    const MixedAnova anova = mixed_anova(rows, 2, {{"renderer", 2}});
+    EXPECT_NEAR(*effect(anova, "group:renderer").f, t * t, 1e-10);
+    EXPECT_EQ(*effect(anova, "group:renderer").den_df, 16);
+  }
+}
+
+/// Groups that were drawn by lot differ by chance alone.
+TEST(MixedAnova, PermutedGroupsHaveUniformP) {
+  constexpr int kStudies = 500;
+  for (const std::uint64_t seed : {3U, 4U}) {
+    Random random(seed);
+    for (const char* const name : {"group", "group:renderer"}) {
+      std::vector<double> p;
+      for (int i = 0; i < kStudies; ++i)
+        p.push_back(*effect(mixed_anova(drawn(random, {7, 5}, 2), 2, {{"renderer", 2}}), name).p);
+      std::ranges::sort(p);
+      double distance = 0;
+      for (int i = 0; i < kStudies; ++i) {
+        const double at = p[static_cast<std::size_t>(i)] * kStudies;
+        distance = std::max({distance, std::fabs(at - i), std::fabs(at - i - 1)});
+      }
+      EXPECT_LT(distance / std::sqrt(kStudies), 1.95) << name;  // Kolmogorov: p = 0.001
+    }
+  }
+}
+
+TEST(BetweenGroups, IntervalsCoverTheTruth) {
+  constexpr int kStudies = 500;
+  for (const std::uint64_t seed : {5U, 6U}) {
+    Random random(seed);
+    int covered = 0;
+    for (int i = 0; i < kStudies; ++i) {
+      std::vector<GroupedRow> rows = drawn(random, {8, 12}, 2);
+      for (GroupedRow& row : rows) row.values[1] += row.group == 1 ? 0.5 : 0;
+      const BetweenGroups found = compare_groups(figures_of(rows), 2, {{"renderer", 2}});
+      const auto contrast = std::ranges::find(found.contrasts, true, &GroupContrast::of_difference);
+      covered += contrast->ci95->low <= 0.5 && 0.5 <= contrast->ci95->high;
+    }
+    EXPECT_GE(covered, 0.92 * kStudies);
+    EXPECT_LE(covered, 0.97 * kStudies + 5);
+  }
+}
+
+TEST(BetweenGroups, SmallGroupsSayWhy) {
+  const std::vector<GroupedRow> rows{{0, {1, 2}}, {0, {2, 4}}, {1, {3, 3}}};
+  const BetweenGroups found = compare_groups(figures_of(rows), 2, {{"renderer", 2}});
+  EXPECT_TRUE(found.anova.undefined.empty());
+  EXPECT_EQ(found.contrasts.front().undefined, "a group has one participant, so no variance");
+  EXPECT_EQ(mixed_anova({{0, {1, 2}}, {1, {2, 4}}}, 2, {{"renderer", 2}}).undefined,
+            "one participant in each group, so no variance within groups");
+  EXPECT_EQ(mixed_anova({{0, {1, 2}}}, 2, {{"renderer", 2}}).undefined,
+            "a group has no participant with a value in every cell");
+}
+
+TEST(BetweenGroups, GapsAreLeftOut) {
+  std::vector<GroupedFigures> figures;
+  for (std::size_t i = 0; i < 8; ++i)
+    figures.push_back({"P" + std::to_string(i), i % 2, {double(i), double(i * i)}});
+  figures[3].values[1] = std::nullopt;
+  const BetweenGroups found = compare_groups(figures, 2, {{"renderer", 2}});
+  EXPECT_EQ(found.dropped, std::vector<std::size_t>{3});
+  EXPECT_EQ(found.anova.n, (std::vector<std::size_t>{4, 3}));
+}
+
+}  // namespace
+}  // namespace palpate::analysis
