@@ -210,6 +210,17 @@ struct Check {
       if (!given.contains(key)) faults.push_back({file, pointer + "/" + key, "is missing"});
     }
   }
+  /// Patches of groups, each on the settings of all.
+  void compare_groups(const json& groups, const json& known) {
+    if (!groups.is_object()) {
+      faults.push_back({file, "/groups", "must be an object of a merge patch for each group"});
+      return;
+    }
+    Check patches{file, false};
+    for (const auto& [name, patch] : groups.items())
+      patches.compare(patch, known, "/groups/" + name);
+    faults.insert(faults.end(), patches.faults.begin(), patches.faults.end());
+  }
   void throw_if_any() const {
     if (!faults.empty()) throw protocols::InputError(faults);
   }
@@ -300,8 +311,23 @@ SimulatedSettings read(const json& j) {
   s.between = {between.at("slide_speed_log_sd"), between.at("percept_noise_log_sd"),
                between.at("reaction_delay_log_sd"), between.at("non_decision_log_sd"),
                between.at("threshold_logit_sd")};
-  s.sha256 = settings_checksum(j);
   return s;
+}
+
+/// With those of groups.
+SimulatedSettings read_all(const json& j) {
+  SimulatedSettings all = read(j);
+  all.sha256 = settings_checksum(j);
+  if (!j.contains("groups")) return all;
+  for (const auto& [name, patch] : j["groups"].items()) {
+    json patched = j;
+    patched.erase("groups");
+    patched.merge_patch(patch);
+    SimulatedSettings group = read(patched);
+    group.sha256 = all.sha256;
+    all.groups[name] = std::make_shared<const SimulatedSettings>(std::move(group));
+  }
+  return all;
 }
 
 /// The frozen settings of a version with every key: switches unknown to it have the values that
@@ -314,16 +340,27 @@ json complete_settings(int version) {
   return settings;
 }
 
+/// Removes the key `groups`. \return its value; null: there was none
+json taken_groups(json& settings) {
+  if (!settings.is_object() || !settings.contains("groups")) return nullptr;
+  json groups = std::move(settings["groups"]);
+  settings.erase("groups");
+  return groups;
+}
+
 /// Applies the JSON merge patch (RFC 7396) in a file.
 /// \throws protocols::InputError naming unknown keys and wrong values
 void patch_settings(json& settings, const std::string& path) {
   protocols::FaultList found(path);
-  const json patch = protocols::read_json(protocols::read_text_file(path), found);
+  json patch = protocols::read_json(protocols::read_text_file(path), found);
   found.throw_if_any();
   Check check{path, false};
+  const json groups = taken_groups(patch);
   check.compare(patch, settings, "");
+  if (!groups.is_null()) check.compare_groups(groups, settings);
   check.throw_if_any();
   settings.merge_patch(patch);
+  if (!groups.is_null()) settings["groups"] = groups;
 }
 
 json patched_settings(const std::string& patch_path, int version) {
@@ -354,7 +391,10 @@ std::string setting_fault(const std::string& pointer, const json& value, const j
 
 void check_settings(const json& settings) {
   Check check{"settings of the simulated participant", true};
-  check.compare(settings, complete_settings(3), "");
+  json of_all = settings;
+  const json groups = taken_groups(of_all);
+  check.compare(of_all, complete_settings(3), "");
+  if (!groups.is_null()) check.compare_groups(groups, complete_settings(3));
   check.throw_if_any();
 }
 
@@ -366,7 +406,7 @@ std::vector<int> participant_versions() {
 }
 
 SimulatedSettings load_simulated_settings(const std::string& patch_path, int version) {
-  return read(patched_settings(patch_path, version));
+  return read_all(patched_settings(patch_path, version));
 }
 
 std::string simulated_settings_text(const std::string& patch_path, int version) {
@@ -384,7 +424,13 @@ std::optional<int> participant_version_of(const std::string& sha256,
 SimulatedSettings read_simulated_settings(const std::string& text) {
   const json settings = read_json(text);
   check_settings(settings);
-  return read(settings);
+  return read_all(settings);
+}
+
+const SimulatedSettings& settings_of_group(const SimulatedSettings& settings,
+                                           const std::string& group) {
+  const auto own = settings.groups.find(group);
+  return own == settings.groups.end() ? settings : *own->second;
 }
 
 SimulatedSettings individual(const SimulatedSettings& settings, std::uint64_t seed, int number) {

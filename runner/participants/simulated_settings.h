@@ -3,6 +3,8 @@
 // differ by switches, which a patch can set in any version.
 
 #include <cstdint>
+#include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -83,6 +85,8 @@ struct SimulatedSettings {
     double threshold;                                                 ///< sd of the logit
   } between;
   std::string sha256;  ///< of the settings used, patch included
+  /// Of groups of participants that differ, by name; the checksum is that of the whole settings.
+  std::map<std::string, std::shared_ptr<const SimulatedSettings>> groups;
 };
 
 /// The default version.
@@ -104,6 +108,10 @@ std::string simulated_settings_text(const std::string& patch_path,
 std::optional<int> participant_version_of(const std::string& sha256, const std::string& patch_path);
 /// Reads such a text. \throws InputError if a key is missing or has an invalid value
 SimulatedSettings read_simulated_settings(const std::string& text);
+
+/// The settings of a group's participants.
+const SimulatedSettings& settings_of_group(const SimulatedSettings& settings,
+                                           const std::string& group);
 
 /// The settings of participant `number` of a study, with individual speed, noise, delay and
 /// threshold.

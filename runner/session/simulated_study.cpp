@@ -310,13 +310,14 @@ class SimulatedGroups {
                   const participants::SimulatedSettings& settings, std::uint64_t seed,
                   const participants::JudgementOf& planned)
       : groups_(protocol.groups) {
-    std::vector<const protocols::Protocol*> shown;
-    for (const auto& group : protocol.group_protocols) shown.push_back(group.get());
-    if (shown.empty()) shown.push_back(&protocol);
-    for (const protocols::Protocol* const one : shown) {
-      studies_.push_back(std::make_unique<SimulatedStudy>(*one, settings, seed));
+    const auto add = [&](const protocols::Protocol& shown, const std::string& group) {
+      studies_.push_back(std::make_unique<SimulatedStudy>(
+          shown, participants::settings_of_group(settings, group), seed));
       studies_.back()->planned = planned;
-    }
+    };
+    if (!groups_.any()) add(protocol, "");
+    for (std::size_t i = 0; i < protocol.group_protocols.size(); ++i)
+      add(*protocol.group_protocols[i], groups_.names[i]);
   }
   const SimulatedStudy& study_of(int participant_number) const {
     return *studies_[groups_.group(participant_number)];

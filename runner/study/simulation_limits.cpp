@@ -17,13 +17,17 @@ session::LimitedForSimulation fit_to_simulation(protocols::Protocol& protocol,
   session::LimitedForSimulation limited = session::limit_for_simulation(protocol, simulated);
   std::string reasons;
   const auto add_reasons = [&](const protocols::Protocol& shown, const std::string& group) {
-    for (const std::string& fault :
-         session::simulation_faults(shown, StimulusLibrary(shown), simulated))
-      reasons += "\n" + group + fault;
+    for (const std::string& fault : session::simulation_faults(
+             shown, StimulusLibrary(shown), participants::settings_of_group(simulated, group)))
+      reasons += "\n" + (group.empty() ? "" : "group '" + group + "': ") + fault;
   };
+  for (const auto& [name, own] : simulated.groups) {
+    if (protocol.groups.find(name) == protocol.groups.names.size())
+      reasons += "\nthe settings have a group '" + name + "', the protocol has none of that name";
+  }
   if (!protocol.groups.any()) add_reasons(protocol, "");
   for (std::size_t i = 0; i < protocol.group_protocols.size(); ++i)
-    add_reasons(*protocol.group_protocols[i], "group '" + protocol.groups.names[i] + "': ");
+    add_reasons(*protocol.group_protocols[i], protocol.groups.names[i]);
   if (!reasons.empty()) throw UsageError("this protocol cannot be simulated:" + reasons);
   return limited;
 }
