@@ -13,9 +13,10 @@ namespace palpate::runner::station {
 
 /// What the choice depends on.
 struct GroupFacts {
-  std::optional<int> enrolled;         ///< number of a participant who is known
-  std::set<int> taken;                 ///< numbers of others
-  std::vector<std::size_t> completed;  ///< participants of each group who have done every session
+  std::optional<int> enrolled = {};  ///< number of a participant who is known
+  std::set<int> taken = {};          ///< numbers of others
+  std::vector<std::size_t> completed =
+      {};  ///< participants of each group who have done every session
 };
 
 /// The number that --group, --fill or the protocol's own rule gives to a participant; none: the
