@@ -75,7 +75,7 @@ GroupJson measure_json(const GroupedMeasure& of) {
                 {"groups", of.groups},   {"renderers", of.renderers}, {"n", of.result.anova.n}};
   if (!of.result.anova.undefined.empty()) out["reason"] = of.result.anova.undefined;
   out["left_out"] = GroupJson::array();
-  for (const std::size_t row : of.result.dropped) out["left_out"].push_back(of.participants[row]);
+  for (const std::size_t row : of.result.dropped) out["left_out"].push_back(of.figures[row].participant);
   out["effects"] = GroupJson::object();
   for (const GroupEffect& effect : of.result.anova.effects)
     out["effects"][effect.name] = group_effect_json(effect);
@@ -166,7 +166,7 @@ Table group_means_table(const GroupedMeasure& of, const std::string& label) {
   if (!of.result.dropped.empty()) {
     std::string names;
     for (const std::size_t row : of.result.dropped)
-      names += (names.empty() ? "" : ", ") + printable(of.participants[row]);
+      names += (names.empty() ? "" : ", ") + printable(of.figures[row].participant);
     out.notes.push_back("Without a value in every condition, left out: " + names + ".");
   }
   return out;

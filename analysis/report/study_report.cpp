@@ -32,7 +32,8 @@ std::string study_html(const StudyAnalysis& analysis, const StudyRecord& record)
 
 std::vector<Figure> study_figures(const StudyAnalysis& analysis, const StudyRecord& record) {
   if (is_identification_alone(analysis)) return figures_of(*analysis.identification, record);
-  std::vector<Figure> figures = task_figures(analysis);
+  std::vector<Figure> figures = between_figures(analysis);
+  for (Figure& figure : task_figures(analysis)) figures.push_back(std::move(figure));
   if (analysis.identification) {
     for (Figure& figure : figures_of(*analysis.identification, {}))
       figures.push_back(std::move(figure));

@@ -187,6 +187,7 @@ class TaskPage {
   void put_groups() {
     if (analysis_.between_groups.empty()) return;
     page_.begin_section("groups", "Groups of participants", "Groups");
+    for (const Figure& figure : between_figures(analysis_)) page_.put_figure(figure);
     for (const Table& table : groups_tables(analysis_.between_groups, label_))
       put_table(page_.body(), table);
     page_.end_section();

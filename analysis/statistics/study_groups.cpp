@@ -29,7 +29,7 @@ GroupedMeasure identification_by_group(const Analysis& analysis, const GroupLabe
   out.groups = labels.names;
   out.renderers = analysis.table.renderers;
   const ParticipantCells& cells = analysis.description.participant_cells;
-  std::vector<GroupedFigures> figures;
+  std::vector<GroupedFigures>& figures = out.figures;
   for (std::size_t p = 0; p < analysis.table.participants.size(); ++p) {
     const std::string& name = analysis.table.participants[p];
     const auto group = labels.of.find(name);
@@ -38,7 +38,6 @@ GroupedMeasure identification_by_group(const Analysis& analysis, const GroupLabe
     for (const auto& renderer : cells) {
       for (const auto& shape : renderer) one.values.push_back(value(shape[p]));
     }
-    out.participants.push_back(name);
     figures.push_back(std::move(one));
   }
   out.result =
@@ -57,7 +56,7 @@ GroupedMeasure task_by_group(const TaskGroup& group, const GroupLabels& labels) 
   out.unit = group.unit;
   out.logarithms = group.geometric;
   out.groups = labels.names;
-  std::vector<GroupedFigures> figures;
+  std::vector<GroupedFigures>& figures = out.figures;
   std::map<std::string, std::size_t> row_of;
   for (std::size_t r = 0; r < group.renderers.size(); ++r) {
     out.renderers.push_back(group.renderers[r].renderer);
@@ -68,7 +67,6 @@ GroupedMeasure task_by_group(const TaskGroup& group, const GroupLabels& labels) 
       if (is_new) {
         figures.push_back({one.participant, known->second,
                            std::vector<std::optional<double>>(group.renderers.size())});
-        out.participants.push_back(one.participant);
       }
       figures[row->second].values[r] = out.logarithms ? std::log(one.value) : one.value;
     }

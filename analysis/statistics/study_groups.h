@@ -15,12 +15,12 @@ struct StudyAnalysis;
 struct GroupedMeasure {
   /// "time", "accuracy"; of tasks "pse", "jnd", "threshold", "exponent", "rating", ...
   std::string measure;
-  std::string task, block_name, shape;    ///< of tasks; "": over all
-  std::string unit;                       ///< of the figures, whatever the scale; "": none
-  bool logarithms = false;                ///< natural logarithms are compared: ratios
-  std::vector<std::string> groups;        ///< the first is the reference
-  std::vector<std::string> renderers;     ///< likewise
-  std::vector<std::string> participants;  ///< of each row
+  std::string task, block_name, shape;  ///< of tasks; "": over all
+  std::string unit;                     ///< of the figures, whatever the scale; "": none
+  bool logarithms = false;              ///< natural logarithms are compared: ratios
+  std::vector<std::string> groups;      ///< the first is the reference
+  std::vector<std::string> renderers;   ///< likewise
+  std::vector<GroupedFigures> figures;  ///< of every participant, by renderer, then shape
   BetweenGroups result;
 };
 
