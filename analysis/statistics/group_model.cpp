@@ -101,12 +101,13 @@ Bounds single_bounds(const GroupData& data) {
   return bounds;
 }
 
-struct Spread {
+struct SpreadOverPeople {
   double mean = 0, sd = 0;
 };
 
 /// Of the participants' means of the coordinate under a flat prior.
-Spread spread_of_means(const GroupData& data, const Likelihoods& participants, bool first) {
+SpreadOverPeople spread_of_means(const GroupData& data, const Likelihoods& participants,
+                                 bool first) {
   const GroupAxis& axis = first ? data.first : data.second;
   if (axis.points == 1) return {};
   double n = 0, sum = 0, squares = 0;
@@ -127,8 +128,8 @@ Spread spread_of_means(const GroupData& data, const Likelihoods& participants, b
 }
 
 std::vector<VectorXd> single_starts(const GroupData& data, const Likelihoods& participants) {
-  const Spread first = spread_of_means(data, participants, true);
-  const Spread second = spread_of_means(data, participants, false);
+  const SpreadOverPeople first = spread_of_means(data, participants, true);
+  const SpreadOverPeople second = spread_of_means(data, participants, false);
   const auto start = [&](double first_sd, double second_sd) {
     VectorXd x(4);
     x << first.mean / unit_of(data.first), std::log(first_sd), second.mean / unit_of(data.second),
