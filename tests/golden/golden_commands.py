@@ -238,7 +238,9 @@ def protocol_lines():
     yield [*steps("schedule protocols/size-questplus.json --recover 20 --seed 2", "validate protocols/roughness-magnitude.json --texts",
                   "validate protocols/roughness-magnitude.json --language de"), refused("validate protocols/quick.json --calibration none.json"),
            broken, refused("validate broken.json"), refused("simulate broken.json --db broken.db"),
-           refused("schedule broken.json --participant 1")]
+           refused("schedule broken.json --participant 1"),
+           refused("run protocols/quick.json --db none.db --participant P01 --device simulated --no-window --group old"),
+           refused("run protocols/quick.json --db none.db --participant P01 --device simulated --no-window --fill")]
 
 
 def scene_lines():

@@ -25,6 +25,10 @@ class Groups(command_case.CommandCase):
     def grouped(self, **changes):
         return self.file("p.json", SMALL | {"groups": SMALL["groups"] | changes})
 
+    def analyzed(self, *source):
+        self.palpate("analyze", *source, "--json", self.dir / "found.json", "--force")
+        return json.loads((self.dir / "found.json").read_text())
+
     def simulated(self, protocol, *options, name="study.db"):
         db = self.dir / name
         self.palpate("simulate", protocol, "--db", db, *options)
@@ -57,13 +61,12 @@ class Groups(command_case.CommandCase):
         text, _ = self.exported(self.simulated(self.file("p.json", plain), "--participants", 2))
         self.assertTrue(text.startswith("participant_id,session,"))
         db = self.dir / "study.db"
-        self.assertNotIn("between_groups", json.loads(self.palpate("analyze", "--db", db, "--format", "json").stdout))
+        self.assertNotIn("between_groups", self.analyzed("--db", db))
 
     def test_database_and_table_compare_groups_alike(self):
         db = self.simulated(self.grouped(), "--groups", "young=4,old=3")
         self.exported(db)
-        found = [json.loads(self.palpate("analyze", *source, "--format", "json").stdout)
-                 for source in (["--db", db], ["--csv", self.dir / "study.csv"])]
+        found = [self.analyzed(*source) for source in (["--db", db], ["--csv", self.dir / "study.csv"])]
         self.assertEqual(found[0]["between_groups"], found[1]["between_groups"])
         self.assertEqual(found[0]["effects"], found[1]["effects"])
         effects = found[0]["effects"]["exponent"]["a"]
@@ -151,7 +154,7 @@ class Groups(command_case.CommandCase):
     def test_the_example_is_of_use(self):
         db = self.dir / "two.db"
         self.palpate("simulate", PROTOCOLS / "stiffness-two-groups.json", "--db", db, "--groups", "young=3,older=3")
-        found = json.loads(self.palpate("analyze", "--db", db, "--format", "json").stdout)
+        found = self.analyzed("--db", db)
         self.assertEqual({one["measure"] for one in found["between_groups"]}, {"pse", "jnd", "weber_fraction"})
 
 
