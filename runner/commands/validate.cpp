@@ -119,6 +119,7 @@ void print_task_summary(const protocols::Protocol& protocol, std::ostream& out) 
     for (const std::string& line : study::in_words(protocol, block))
       out << "      " << line << "\n";
   }
+  if (protocol.groups.any()) out << "  groups      " << study::groups_in_words(protocol) << "\n";
   for (const protocols::PageSpec& page : protocol.pages) {
     constexpr std::array kPlaces = {"before the first block", "before block ", "after the last"};
     out << "  page        " << page.name << ", " << kPlaces[static_cast<std::size_t>(page.when)]
@@ -342,7 +343,12 @@ int validate_command(const std::vector<std::string>& args) {
     if (felt)
       std::cout << "  note        stimulus " << protocol.stimuli[i].name << ": " << *felt << "\n";
   }
-  print_fitness(protocol, library, measured, std::cout);
+  if (!protocol.groups.any()) print_fitness(protocol, library, measured, std::cout);
+  for (std::size_t i = 0; i < protocol.group_protocols.size(); ++i) {
+    const protocols::Protocol& group = *protocol.group_protocols[i];
+    std::cout << "group " << protocol.groups.names[i] << "\n";
+    print_fitness(group, StimulusLibrary(group), measured, std::cout);
+  }
   return 0;
 }
 

@@ -99,11 +99,15 @@ class Questions {
     return answer;
   }
 
-  static Question study_type() {
+  Question study_type() const {
+    const bool groups = made_.protocol.groups.any();
     return {"q3",
             "Study type",
-            {text("An experiment within participants: every participant does trials of all "
-                  "conditions, in an order that is drawn beforehand.")},
+            {text(groups ? "An experiment with groups of participants; within each, every "
+                           "participant does trials of all conditions of the group, in an order "
+                           "that is drawn beforehand."
+                         : "An experiment within participants: every participant does trials of "
+                           "all conditions, in an order that is drawn beforehand.")},
             {"Experiment - A researcher randomly assigns treatments to study subjects, this "
              "includes field or lab experiments. This is also known as an intervention experiment "
              "and includes randomized controlled trials."}};

@@ -141,6 +141,7 @@ class TaskAnswers final : public StudyAnswers {
                        "stylus, unseen, and answers."));
     for (const TaskBlock* block : blocks_) out.push_back(item(block_in_words(*block)));
     out.push_back(item("Order of the blocks: " + order_of_blocks()));
+    if (protocol_.groups.any()) out.push_back(item(groups()));
     if (protocol_.sessions.count > 1)
       out.push_back(item("Sessions: " + std::to_string(protocol_.sessions.count) + "."));
     if (const std::string words = practice(); !words.empty()) out.push_back(item(words));
@@ -466,13 +467,27 @@ class TaskAnswers final : public StudyAnswers {
     return out;
   }
 
+  /// Who belongs to which group, and how many.
+  std::string groups() const {
+    std::vector<std::size_t> counts(protocol_.groups.names.size());
+    for (std::size_t n = 1; n <= made_.participants; ++n)
+      ++counts[protocol_.groups.group(static_cast<int>(n))];
+    std::string out = "Groups of participants: " + study::groups_in_words(protocol_) + ". Planned:";
+    for (std::size_t i = 0; i < counts.size(); ++i)
+      out += (i == 0 ? " " : ", ") + protocol_.groups.names[i] + " " + std::to_string(counts[i]);
+    return out +
+           ". Compared by a mixed analysis of variance of the participants' values (type "
+           "III), and by Welch's t.";
+  }
+
   std::string order_of_blocks() const {
     if (blocks_.size() == 1) return "there is one.";
     const int orders = protocols::block_orders(protocol_);
     if (orders < 2) return "the same for everybody: " + study::condition_order(protocol_, 1) + ".";
     return "counterbalanced over participant numbers within a session (balanced Latin square; it "
            "repeats after " +
-           counted(static_cast<std::size_t>(orders), "participant", "participants") + ").";
+           counted(static_cast<std::size_t>(orders), "participant", "participants") +
+           (protocol_.groups.any() ? " of a group)." : ").");
   }
 
   std::string practice() const {

@@ -263,6 +263,22 @@ std::string task_schedule_text(const protocols::Protocol& protocol, int particip
   return table_text(protocol, trials);
 }
 
+std::string groups_in_words(const protocols::Protocol& protocol) {
+  const GroupAssignment& groups = protocol.groups;
+  if (!groups.any()) return "";
+  std::string names;
+  for (const std::string& name : groups.names) names += (names.empty() ? "" : ", ") + name;
+  switch (groups.rule) {
+    case GroupAssignment::Rule::balanced:
+      return names + ": in turn by participant number";
+    case GroupAssignment::Rule::blocked:
+      return names + ": in permuted blocks with " + std::to_string(groups.block) + " of each";
+    case GroupAssignment::Rule::given:
+      break;
+  }
+  return names + ": chosen by the experimenter";
+}
+
 std::string in_words(const protocols::ProcedureSpec& procedure) {
   return std::visit([](const auto& spec) { return words(spec); }, procedure);
 }

@@ -39,6 +39,9 @@ inline void check_participant_number(int participant) {
     throw UsageError("--participant: expected 1 or more, found " + std::to_string(participant));
 }
 
+/// "young, older: in turn by participant number"; "": no groups
+std::string groups_in_words(const protocols::Protocol& protocol);
+
 // The schedule of a protocol of version 2, printed.
 
 /// \param participant  number. \param format  table, csv or json
