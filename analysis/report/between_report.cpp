@@ -69,16 +69,43 @@ GroupJson contrast_json(const GroupedMeasure& of, const GroupContrast& one) {
   return out;
 }
 
+GroupJson model_json(const GroupedMeasure& of, const GroupedMixedModel& model) {
+  GroupJson out{{"formula",
+                 "log(response_time) ~ group * renderer * shape + (1 + renderer | "
+                 "participant)"},
+                {"n_observations", model.n_observations},
+                {"n_participants", model.n_participants}};
+  if (!model.undefined.empty()) out["reason"] = model.undefined;
+  if (!model.singular.empty()) out["singular"] = model.singular;
+  out["effects"] = GroupJson::object();
+  for (const GroupEffect& effect : model.effects)
+    out["effects"][effect.name] = {{"num_df", number_json(effect.num_df)},
+                                   {"den_df", number_json(effect.den_df)},
+                                   {"f", number_json(effect.f)},
+                                   {"p", number_json(effect.p)}};
+  out["means"] = GroupJson::array();
+  for (const ModelMean& one : model.means)
+    out["means"].push_back({{"group", of.groups[one.group]},
+                            {"renderer", of.renderers[one.renderer]},
+                            {"estimate", number_json(one.value.estimate)},
+                            {"se", number_json(one.value.se)},
+                            {"df", number_json(one.value.df_satterthwaite)},
+                            {"ci95", interval_json(one.value.ci95)}});
+  return out;
+}
+
 GroupJson measure_json(const GroupedMeasure& of) {
   GroupJson out{{"measure", of.measure}, {"task", of.task},           {"block", of.block_name},
                 {"stimulus", of.shape},  {"unit", of.unit},           {"logarithms", of.logarithms},
                 {"groups", of.groups},   {"renderers", of.renderers}, {"n", of.result.anova.n}};
   if (!of.result.anova.undefined.empty()) out["reason"] = of.result.anova.undefined;
   out["left_out"] = GroupJson::array();
-  for (const std::size_t row : of.result.dropped) out["left_out"].push_back(of.figures[row].participant);
+  for (const std::size_t row : of.result.dropped)
+    out["left_out"].push_back(of.figures[row].participant);
   out["effects"] = GroupJson::object();
   for (const GroupEffect& effect : of.result.anova.effects)
     out["effects"][effect.name] = group_effect_json(effect);
+  if (of.model) out["mixed_model"] = model_json(of, *of.model);
   out["means"] = GroupJson::array();
   for (const GroupMarginal& one : of.result.marginals)
     out["means"].push_back(marginal_json(of, one));
@@ -189,6 +216,24 @@ Table group_effects_table(const GroupedMeasure& of, const std::string& label) {
   return out;
 }
 
+/// The mixed model's effects; without rows if there is none.
+Table group_model_table(const GroupedMeasure& of, const std::string& label) {
+  Table out;
+  out.caption = group_caption(title_of(of) + ": linear mixed model of single trials", label);
+  out.header = {"Effect", "df", "F", "p"};
+  if (!of.model) return out;
+  for (const GroupEffect& one : of.model->effects) {
+    out.rows.push_back(
+        {one.name, one.num_df ? short_number(*one.num_df) + ", " + fixed(*one.den_df, 1) : kMissing,
+         number(one.f, 2), p_or_missing(one.p)});
+  }
+  if (!of.model->singular.empty()) out.notes.push_back("Singular: " + of.model->singular + ".");
+  out.notes.emplace_back(
+      "log(response_time) ~ group * renderer * shape + (1 + renderer | participant), REML, type "
+      "III, degrees of freedom by Satterthwaite.");
+  return out;
+}
+
 Table group_contrasts_table(const GroupedMeasure& of, const std::string& label) {
   Table out;
   out.caption = group_caption(title_of(of) + ": groups compared (Welch's t)", label);
@@ -248,6 +293,10 @@ std::string groups_text(const std::vector<GroupedMeasure>& measures) {
     }
     for (const GroupEffect& effect : one.result.anova.effects)
       text += "  " + effect.name + ": " + f_test_text(effect) + "\n";
+    if (one.model && !one.model->effects.empty()) text += "  mixed model of single trials\n";
+    for (std::size_t i = 0; one.model && i < one.model->effects.size(); ++i)
+      text +=
+          "    " + one.model->effects[i].name + ": " + f_test_text(one.model->effects[i]) + "\n";
     for (const GroupContrast& contrast : one.result.contrasts)
       text += "  " + group_contrast_text(one, contrast) + "\n";
     text += "\n";
@@ -261,6 +310,8 @@ std::vector<Table> groups_tables(const std::vector<GroupedMeasure>& measures,
   for (const GroupedMeasure& one : measures) {
     out.push_back(group_means_table(one, label));
     out.push_back(group_effects_table(one, label));
+    if (Table model = group_model_table(one, label); !model.rows.empty())
+      out.push_back(std::move(model));
     out.push_back(group_contrasts_table(one, label));
   }
   return out;

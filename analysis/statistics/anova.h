@@ -25,6 +25,16 @@ inline Eigen::MatrixXd unit_average(Eigen::Index levels) {
   return Eigen::MatrixXd::Constant(1, levels, 1 / std::sqrt(static_cast<double>(levels)));
 }
 
+/// The Kronecker product.
+inline Eigen::MatrixXd kronecker(const Eigen::MatrixXd& a, const Eigen::MatrixXd& b) {
+  Eigen::MatrixXd out(a.rows() * b.rows(), a.cols() * b.cols());
+  for (Eigen::Index i = 0; i < a.rows(); ++i) {
+    for (Eigen::Index j = 0; j < a.cols(); ++j)
+      out.block(i * b.rows(), j * b.cols(), b.rows(), b.cols()) = a(i, j) * b;
+  }
+  return out;
+}
+
 /// The p of an F.
 inline double f_upper_tail(double f, double num_df, double den_df) {
   return cdf(complement(boost::math::fisher_f(num_df, den_df), f));

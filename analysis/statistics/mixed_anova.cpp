@@ -14,15 +14,6 @@ using Eigen::MatrixXd;
 using Eigen::RowVectorXd;
 using Eigen::VectorXd;
 
-MatrixXd kronecker(const MatrixXd& a, const MatrixXd& b) {
-  MatrixXd out(a.rows() * b.rows(), a.cols() * b.cols());
-  for (Index i = 0; i < a.rows(); ++i) {
-    for (Index j = 0; j < a.cols(); ++j)
-      out.block(i * b.rows(), j * b.cols(), b.rows(), b.cols()) = a(i, j) * b;
-  }
-  return out;
-}
-
 /// A set of factors within participants, as a bit each.
 using Subset = std::size_t;
 

@@ -317,6 +317,84 @@ std::string why_no_fit(const ParticipantCells& participant_cells, const ModelCel
   return {};
 }
 
+/// Why these data have no fit.
+std::string why_not_fitted(const ReducedModel& prepared, std::size_t renderers) {
+  if (prepared.data.groups.size() < 2)
+    return "one participant, so no variance between participants";
+  if (!prepared.shared) {
+    return renderers == 2 ? "no participant has times for both renderers"
+                          : "two of the renderers have no participant with times for both";
+  }
+  if (prepared.degrees_of_freedom < 1) return "too few trials to estimate the residual variance";
+  if (std::sqrt(prepared.least_square / prepared.degrees_of_freedom) <=
+      1e-10 * std::max(1.0, prepared.scale))
+    return "no residual variance: participants and shapes explain every time";
+  return {};
+}
+
+/// Treatment coding of the random effects: the first renderer and the differences from it.
+MatrixXd random_coding(std::size_t renderers) {
+  MatrixXd coding =
+      MatrixXd::Identity(static_cast<Index>(renderers), static_cast<Index>(renderers));
+  coding.col(0).setOnes();
+  return coding;
+}
+
+/// The cells of each group as shapes of their own, so that the fixed effects are those of group,
+/// renderer and shape.
+ParticipantCells cells_by_group(const ParticipantCells& all,
+                                const std::vector<std::size_t>& group_of, std::size_t groups) {
+  ParticipantCells out(all.size());
+  for (std::size_t r = 0; r < all.size(); ++r) {
+    for (std::size_t group = 0; group < groups; ++group) {
+      for (const std::vector<ParticipantCell>& shape : all[r]) {
+        std::vector<ParticipantCell>& own = out[r].emplace_back(shape);
+        for (std::size_t p = 0; p < own.size(); ++p) {
+          if (group_of[p] != group) own[p] = {};
+        }
+      }
+    }
+  }
+  return out;
+}
+
+/// F test that combinations of cell means are 0, one a row.
+GroupEffect joint_test(const Tester& tested, const MatrixXd& rows, std::string name) {
+  GroupEffect out;
+  out.name = std::move(name);
+  const Index q = rows.rows();
+  const auto variance = [&](const VectorXd& weights) {
+    const double se = tested(weights).se.value_or(0);
+    return se * se;
+  };
+  MatrixXd spread(q, q);
+  for (Index i = 0; i < q; ++i) {
+    for (Index j = 0; j <= i; ++j) {
+      const VectorXd a = rows.row(i).transpose(), b = rows.row(j).transpose();
+      spread(i, j) = spread(j, i) = i == j ? variance(a) : (variance(a + b) - variance(a - b)) / 4;
+    }
+  }
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(spread);
+  double sum = 0, excess = 0, least = HUGE_VAL, most = 0;
+  for (Index i = 0; i < q; ++i) {
+    const ModelEstimate one = tested(rows.transpose() * eigen.eigenvectors().col(i));
+    if (!one.t) {
+      out.undefined = one.undefined;
+      return out;
+    }
+    sum += *one.t * *one.t;
+    excess += *one.df_satterthwaite / (*one.df_satterthwaite - 2);
+    least = std::min(least, *one.df_satterthwaite);
+    most = std::max(most, *one.df_satterthwaite);
+  }
+  const auto df = static_cast<double>(q);
+  out.num_df = df;
+  out.den_df = most - least < 1e-8 * most ? most : least <= 2 ? 2 : 2 * excess / (excess - df);
+  out.f = sum / df;
+  out.p = f_upper_tail(*out.f, df, *out.den_df);
+  return out;
+}
+
 }  // namespace
 
 RmAnova rm_anova(const ParticipantCells& participant_cells) {
@@ -401,24 +479,10 @@ MixedModel mixed_model(const ParticipantCells& participant_cells,
     return refuse(reason);
   const ReducedModel prepared(participant_cells, cells);
   out.n_participants = prepared.data.groups.size();
-  if (out.n_participants < 2) return refuse("one participant, so no variance between participants");
-  if (!prepared.shared) {
-    return refuse(participant_cells.size() == 2
-                      ? "no participant has times for both renderers"
-                      : "two of the renderers have no participant with times for both");
-  }
-  if (prepared.degrees_of_freedom < 1) {
-    return refuse("too few trials to estimate the residual variance");
-  }
-  if (std::sqrt(prepared.least_square / prepared.degrees_of_freedom) <=
-      1e-10 * std::max(1.0, prepared.scale)) {
-    return refuse("no residual variance: participants and shapes explain every time");
-  }
-
-  const auto q = static_cast<Index>(participant_cells.size());
-  MatrixXd coding = MatrixXd::Identity(q, q);
-  coding.col(0).setOnes();
-  const RemlOptimum optimum = reml_optimum(prepared.data, coding);
+  if (const std::string reason = why_not_fitted(prepared, participant_cells.size());
+      !reason.empty())
+    return refuse(reason);
+  const RemlOptimum optimum = reml_optimum(prepared.data, random_coding(participant_cells.size()));
   if (!optimum.converged) return refuse("the fit did not converge");
 
   const Columns columns = treatment_columns(cells, renderers, shapes);
@@ -453,6 +517,77 @@ MixedModel mixed_model(const ParticipantCells& participant_cells,
   std::size_t test = 0;
   for (auto& contrasts : out.contrasts) {
     for (ModelEstimate& contrast : contrasts) contrast.p_holm = adjusted[test++];
+  }
+  return out;
+}
+
+GroupedMixedModel grouped_mixed_model(const ParticipantCells& participant_cells,
+                                      const std::vector<std::string>& renderers,
+                                      const std::vector<std::size_t>& group_of,
+                                      std::size_t groups) {
+  GroupedMixedModel out;
+  const std::size_t shapes = participant_cells.empty() ? 0 : participant_cells.front().size();
+  const ParticipantCells own = cells_by_group(participant_cells, group_of, groups);
+  const ModelCells cells = model_cells(own);
+  for (const auto& renderer : own) {
+    for (const auto& shape : renderer) {
+      for (const ParticipantCell& cell : shape) out.n_observations += cell.n_used;
+    }
+  }
+  out.undefined = why_no_fit(own, cells);
+  if (out.undefined.empty() && cells.n != static_cast<Index>(own.size() * groups * shapes))
+    out.undefined = "a cell of group, renderer and shape has no time";
+  if (!out.undefined.empty()) return out;
+  const ReducedModel prepared(own, cells);
+  out.n_participants = prepared.data.groups.size();
+  out.undefined = why_not_fitted(prepared, own.size());
+  if (out.undefined.empty() && out.n_participants <= groups)
+    out.undefined = "one participant in each group, so no variance within groups";
+  if (!out.undefined.empty()) return out;
+  const RemlOptimum optimum = reml_optimum(prepared.data, random_coding(own.size()));
+  if (!optimum.converged) {
+    out.undefined = "the fit did not converge";
+    return out;
+  }
+  MixedModel variances;
+  put_variances(optimum, renderers, variances);
+  out.singular = variances.singular;
+
+  const Tester tested(prepared, optimum.point);
+  const std::array<std::pair<const char*, Index>, 3> factors{
+      {{"group", static_cast<Index>(groups)},
+       {"renderer", static_cast<Index>(own.size())},
+       {"shape", static_cast<Index>(shapes)}}};
+  // Weights by group, renderer and shape, in the order of the model's cells.
+  const auto in_order = [&](const MatrixXd& rows) {
+    MatrixXd weights = MatrixXd::Zero(rows.rows(), cells.n);
+    for (std::size_t group = 0, at = 0; group < groups; ++group) {
+      for (std::size_t r = 0; r < own.size(); ++r) {
+        for (std::size_t s = 0; s < shapes; ++s, ++at)
+          weights.col(cells.column[r][group * shapes + s]) = rows.col(static_cast<Index>(at));
+      }
+    }
+    return weights;
+  };
+  for (unsigned effect = 1; effect < 8; ++effect) {
+    MatrixXd rows = MatrixXd::Ones(1, 1);
+    std::string name;
+    for (std::size_t i = 0; i < factors.size(); ++i) {
+      const auto& [factor, levels] = factors[i];
+      const bool in = (effect >> i & 1) != 0;
+      rows = kronecker(rows, in ? helmert_contrasts(levels)
+                                : MatrixXd::Constant(1, levels, 1 / static_cast<double>(levels)));
+      if (in) name += (name.empty() ? "" : ":") + std::string(factor);
+    }
+    if (rows.rows() > 0) out.effects.push_back(joint_test(tested, in_order(rows), name));
+  }
+  for (std::size_t group = 0; group < groups; ++group) {
+    for (std::size_t r = 0; r < own.size(); ++r) {
+      VectorXd weights = VectorXd::Zero(cells.n);
+      for (std::size_t s = 0; s < shapes; ++s)
+        weights(cells.column[r][group * shapes + s]) = 1 / static_cast<double>(shapes);
+      out.means.push_back({group, r, tested(weights)});
+    }
   }
   return out;
 }

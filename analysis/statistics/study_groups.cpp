@@ -46,6 +46,16 @@ GroupedMeasure identification_by_group(const Analysis& analysis, const GroupLabe
   return out;
 }
 
+GroupedMixedModel model_of_times(const Analysis& analysis, const GroupLabels& labels) {
+  std::vector<std::size_t> group_of;
+  for (const std::string& name : analysis.table.participants) {
+    const auto group = labels.of.find(name);
+    group_of.push_back(group == labels.of.end() ? labels.names.size() : group->second);
+  }
+  return grouped_mixed_model(analysis.description.participant_cells, analysis.table.renderers,
+                             group_of, labels.names.size());
+}
+
 /// A measure of a task, by renderer.
 GroupedMeasure task_by_group(const TaskGroup& group, const GroupLabels& labels) {
   GroupedMeasure out;
@@ -87,6 +97,7 @@ std::vector<GroupedMeasure> between_groups(const StudyAnalysis& analysis) {
     time.measure = "time";
     time.unit = "s";
     time.logarithms = true;
+    time.model = model_of_times(*analysis.identification, labels);
     GroupedMeasure& accuracy =
         out.emplace_back(identification_by_group(*analysis.identification, labels, share_correct));
     accuracy.measure = "accuracy";

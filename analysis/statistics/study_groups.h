@@ -2,10 +2,12 @@
 // The measures of a study compared between its groups of participants: times and accuracy of
 // identification, and the figures of each task.
 
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "analysis/statistics/between_groups.h"
+#include "analysis/statistics/mixed_model.h"
 
 namespace palpate::analysis {
 
@@ -22,6 +24,8 @@ struct GroupedMeasure {
   std::vector<std::string> renderers;   ///< likewise
   std::vector<GroupedFigures> figures;  ///< of every participant, by renderer, then shape
   BetweenGroups result;
+  /// Of the logarithms of single times; none: another measure.
+  std::optional<GroupedMixedModel> model;
 };
 
 /// Empty: the study has no groups.

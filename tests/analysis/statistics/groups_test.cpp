@@ -10,7 +10,9 @@
 #include <vector>
 
 #include "analysis/statistics/between_groups.h"
+#include "analysis/statistics/describe.h"
 #include "analysis/statistics/mixed_anova.h"
+#include "analysis/statistics/mixed_model.h"
 #include "data/base/random.h"
 
 namespace palpate::analysis {
@@ -88,6 +90,118 @@ TEST(BetweenGroups, AgreesWithEmmeansAndWelch) {
     expect_near(first.ci95->low, study["welch"]["low"]);
     expect_near(first.ci95->high, study["welch"]["high"]);
   }
+}
+
+/// The trials of a model case as cells.
+ParticipantCells cells_of(const GroupsJson& study) {
+  const std::size_t people = study["group"].size();
+  std::vector<std::vector<std::vector<std::vector<double>>>> times(
+      2, std::vector(3, std::vector(people, std::vector<double>())));
+  for (std::size_t i = 0; i < study["y"].size(); ++i)
+    times[study["renderer"][i]][study["shape"][i]][study["participant"][i]].push_back(
+        study["y"][i]);
+  ParticipantCells cells(2, std::vector(3, std::vector<ParticipantCell>(people)));
+  for (std::size_t r = 0; r < 2; ++r) {
+    for (std::size_t s = 0; s < 3; ++s) {
+      for (std::size_t p = 0; p < people; ++p) {
+        const std::vector<double>& logs = times[r][s][p];
+        ParticipantCell& cell = cells[r][s][p];
+        cell.n_trials = cell.n_correct = cell.n_used = logs.size();
+        if (logs.empty()) continue;
+        cell.mean_log = mean(logs);
+        for (const double log : logs) cell.sum_of_squares_log += std::pow(log - cell.mean_log, 2);
+      }
+    }
+  }
+  return cells;
+}
+
+/// R's derivatives are numerical: hence the tolerances. On the boundary its degrees of freedom are
+/// of another point.
+TEST(GroupedMixedModel, AgreesWithLmerTest) {
+  std::size_t compared = 0;
+  for (const auto& study : fixture()["models"]) {
+    const GroupedMixedModel model =
+        grouped_mixed_model(cells_of(study), {"point", "ray"},
+                            study["group"].get<std::vector<std::size_t>>(), study["groups"]);
+    ASSERT_EQ(model.undefined, "");
+    EXPECT_EQ(model.singular.empty(), !study["singular"].get<bool>());
+    if (study["singular"]) continue;
+    for (const auto& expected : study["effects"]) {
+      SCOPED_TRACE(expected["name"].get<std::string>());
+      const auto found =
+          std::ranges::find(model.effects, expected["name"].get<std::string>(), &GroupEffect::name);
+      ASSERT_NE(found, model.effects.end());
+      const double f = expected["f"], df = expected["den_df"], p = expected["p"];
+      EXPECT_NEAR(*found->f, f, 1e-4 * std::max(1.0, f));
+      EXPECT_EQ(*found->num_df, expected["num_df"].get<double>());
+      EXPECT_NEAR(*found->den_df, df, 2e-3 * df);
+      EXPECT_NEAR(*found->p, p, 1e-3 * p + 1e-6);
+      ++compared;
+    }
+    for (const auto& expected : study["means"]) {
+      const auto found = std::ranges::find_if(model.means, [&](const ModelMean& one) {
+        return one.group == expected["group"] && one.renderer == expected["renderer"];
+      });
+      ASSERT_NE(found, model.means.end());
+      EXPECT_NEAR(*found->value.estimate, expected["mean"].get<double>(), 1e-5);
+      EXPECT_NEAR(*found->value.se, expected["se"].get<double>(), 1e-4);
+    }
+  }
+  EXPECT_GE(compared, 28U);
+}
+
+/// With as many trials in every cell, the test of the group is that of participants' means.
+TEST(GroupedMixedModel, BalancedGroupsGiveTheAnovaOfMeans) {
+  for (const std::uint64_t seed : {1U, 2U}) {
+    Random random(seed);
+    constexpr std::size_t kPeople = 24;
+    ParticipantCells cells(2, std::vector(2, std::vector<ParticipantCell>(kPeople)));
+    std::vector<std::size_t> group_of;
+    std::vector<GroupedRow> rows;
+    for (std::size_t p = 0; p < kPeople; ++p) {
+      group_of.push_back(p % 2);
+      const double own = random.normal();
+      const double slope = random.normal();
+      GroupedRow row{p % 2, {}};
+      for (std::size_t r = 0; r < 2; ++r) {
+        double sum = 0;
+        for (std::size_t s = 0; s < 2; ++s) {
+          ParticipantCell& cell = cells[r][s][p];
+          cell.n_used = cell.n_trials = 20;
+          cell.mean_log = own + (r == 1 ? slope : 0) + 0.1 * random.normal();
+          cell.sum_of_squares_log = 19 * 0.2;
+          sum += cell.mean_log;
+        }
+        row.values.push_back(sum / 2);
+      }
+      rows.push_back(row);
+    }
+    const GroupedMixedModel model = grouped_mixed_model(cells, {"point", "ray"}, group_of, 2);
+    const MixedAnova anova = mixed_anova(rows, 2, {{"renderer", 2}});
+    for (const char* const name : {"group", "renderer", "group:renderer"}) {
+      const auto found = std::ranges::find(model.effects, name, &GroupEffect::name);
+      const auto expected = std::ranges::find(anova.effects, name, &GroupEffect::name);
+      EXPECT_NEAR(*found->f, *expected->f, 1e-4 * *expected->f + 1e-6) << name;
+      EXPECT_NEAR(*found->den_df, 22, 1e-3) << name;
+    }
+  }
+}
+
+TEST(GroupedMixedModel, EmptyCellsSayWhy) {
+  ParticipantCells cells(2, std::vector(2, std::vector<ParticipantCell>(4)));
+  for (std::size_t r = 0; r < 2; ++r) {
+    for (std::size_t s = 0; s < 2; ++s) {
+      for (std::size_t p = 0; p < 4; ++p) {
+        if (r == 1 && s == 1 && p % 2 == 1) continue;
+        cells[r][s][p].n_used = 3;
+        cells[r][s][p].mean_log = static_cast<double>(p + r + s);
+        cells[r][s][p].sum_of_squares_log = 1;
+      }
+    }
+  }
+  EXPECT_EQ(grouped_mixed_model(cells, {"point", "ray"}, {0, 1, 0, 1}, 2).undefined,
+            "a cell of group, renderer and shape has no time");
 }
 
 std::vector<GroupedRow> drawn(Random& random, std::vector<std::size_t> sizes, std::size_t cells) {
