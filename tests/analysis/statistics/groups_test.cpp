@@ -46,7 +46,8 @@ void expect_near(const std::optional<double>& found, const GroupsJson& expected)
 
 TEST(MixedAnova, AgreesWithAfexOnUnbalancedGroups) {
   std::size_t corrected = 0;
-  for (const auto& study : fixture()["cases"]) {
+  const GroupsJson all = fixture();
+  for (const auto& study : all["cases"]) {
     const MixedAnova anova = mixed_anova(rows_of(study), study["groups"], within_of(study));
     ASSERT_EQ(anova.effects.size(), study["effects"].size());
     for (std::size_t i = 0; i < anova.effects.size(); ++i) {
@@ -77,7 +78,8 @@ std::vector<GroupedFigures> figures_of(const std::vector<GroupedRow>& rows) {
 }
 
 TEST(BetweenGroups, AgreesWithEmmeansAndWelch) {
-  for (const auto& study : fixture()["cases"]) {
+  const GroupsJson all = fixture();
+  for (const auto& study : all["cases"]) {
     const BetweenGroups found =
         compare_groups(figures_of(rows_of(study)), study["groups"], within_of(study));
     for (const GroupMarginal& one : found.marginals) {
@@ -120,7 +122,8 @@ ParticipantCells cells_of(const GroupsJson& study) {
 /// of another point.
 TEST(GroupedMixedModel, AgreesWithLmerTest) {
   std::size_t compared = 0;
-  for (const auto& study : fixture()["models"]) {
+  const GroupsJson all = fixture();
+  for (const auto& study : all["models"]) {
     const GroupedMixedModel model =
         grouped_mixed_model(cells_of(study), {"point", "ray"},
                             study["group"].get<std::vector<std::size_t>>(), study["groups"]);
