@@ -102,7 +102,10 @@ std::vector<GroupedMeasure> between_groups(const StudyAnalysis& analysis) {
         out.emplace_back(identification_by_group(*analysis.identification, labels, share_correct));
     accuracy.measure = "accuracy";
   }
-  for (const TaskGroup& group : analysis.groups) out.push_back(task_by_group(group, labels));
+  for (const TaskGroup& group : analysis.groups) {
+    // Weber fractions would repeat the tests of the JNDs that they come from.
+    if (group.measure != "weber_fraction") out.push_back(task_by_group(group, labels));
+  }
   return out;
 }
 
