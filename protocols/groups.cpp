@@ -45,7 +45,7 @@ void read_patches(ObjectReader& section, const GroupAssignment& groups,
   section.section("patch", [&](ObjectReader& all) {
     for (std::size_t i = 0; i < groups.names.size(); ++i) {
       const json* const patch = all.member(groups.names[i].c_str());
-      if (patch == nullptr) continue;
+      if (patch == nullptr || groups.find(groups.names[i]) != i) continue;
       const std::string pointer = all.pointer(groups.names[i]);
       if (!patch->is_object()) {
         all.faults().add(pointer,
@@ -54,7 +54,8 @@ void read_patches(ObjectReader& section, const GroupAssignment& groups,
       }
       for (const char* const key : kUntouched) {
         if (patch->contains(key))
-          all.faults().add(child_pointer(pointer, key), "expected a key that a group may change");
+          all.faults().add(child_pointer(pointer, key),
+                           std::string("expected no change of '") + key + "': all groups share it");
       }
       patches[i] = *patch;
     }

@@ -47,7 +47,7 @@ class Groups(command_case.CommandCase):
         self.assertTrue(text.startswith("participant_id,group,session,"))
         self.assertEqual({row["participant_id"]: row["group"] for row in rows}, {"S001": "young", "S002": "old", "S003": "young"})
         self.palpate("export", "--db", db, "--format", "bids", "--out", self.dir / "bids")
-        people = list(csv.DictReader((self.dir / "bids" / "participants.tsv").open(), delimiter="\t"))
+        people = list(csv.DictReader((self.dir / "bids" / "participants.tsv").read_text().splitlines(), delimiter="\t"))
         self.assertEqual([one["group"] for one in people], ["young", "old", "young"])
         self.assertIn("group", json.loads((self.dir / "bids" / "participants.json").read_text()))
         for table in (self.dir / "bids").glob("sub-*/ses-1/beh/*_beh.tsv"):
