@@ -143,7 +143,8 @@ constexpr std::size_t kShownParticipants = 200;
 /// reversals of a staircase. Participants beyond the first 12 are left out, with a note.
 std::vector<Figure> task_figures(const StudyAnalysis& analysis);
 
-/// For each measure of a study with groups "between1", ...: means of the groups under each renderer
+/// For each stimulus in a block of a study with groups, and for identification, "between1", ...: a
+/// panel for each measure with the means of the groups under each renderer
 /// with their intervals, and every participant.
 std::vector<Figure> between_figures(const StudyAnalysis& analysis);
 

@@ -56,7 +56,8 @@ std::string axis_title(const GroupedMeasure& measure) {
 /// Where renderer r of group g stands: side by side in the group's slot.
 double place_of(const GroupedMeasure& measure, std::size_t group, std::size_t renderer) {
   const auto n = static_cast<double>(measure.renderers.size());
-  return static_cast<double>(group) + (static_cast<double>(renderer) + 0.5) / n;
+  const double step = std::min(0.34, 0.8 / n);
+  return static_cast<double>(group) + 0.5 + (static_cast<double>(renderer) - (n - 1) / 2) * step;
 }
 
 /// Spans the participants' figures and the intervals.
@@ -125,34 +126,48 @@ void add_means(Panel& panel, const GroupedMeasure& measure, std::string& descrip
   }
 }
 
+/// A figure of the measures of a stimulus in a block, or of identification.
+Figure begin_figure(const StudyAnalysis& analysis, const GroupedMeasure& measure,
+                    std::size_t number) {
+  Figure figure;
+  figure.id = "between" + std::to_string(number);
+  figure.title = "Groups: " + (measure.task.empty() ? "identification" : measure.task);
+  for (const std::string* const name : {&measure.block_name, &measure.shape}) {
+    if (!name->empty()) figure.title += ", " + printable(*name);
+  }
+  figure.subtitle = counted(measure.figures.size(), "participant", "participants");
+  if (analysis.table.simulated) figure.label = "SIMULATED PARTICIPANTS";
+  figure.notes.emplace_back(
+      "Large symbols: means of the group with their 95 % intervals (t), geometric if all values "
+      "are ratios. Small symbols: participants.");
+  for (std::size_t r = 0; measure.renderers.size() > 1 && r < measure.renderers.size(); ++r)
+    figure.legend.push_back(entry_of(measure.renderers[r], r));
+  return figure;
+}
+
 }  // namespace
 
 std::vector<Figure> between_figures(const StudyAnalysis& analysis) {
   std::vector<Figure> figures;
+  const GroupedMeasure* before = nullptr;
   for (const GroupedMeasure& measure : analysis.between_groups) {
     if (!measure.result.anova.undefined.empty()) continue;
-    Figure figure;
-    figure.id = "between" + std::to_string(figures.size() + 1);
-    figure.title = "Groups: " + axis_title(measure);
-    for (const std::string* const name : {&measure.block_name, &measure.shape}) {
-      if (!name->empty()) figure.title += ", " + printable(*name);
-    }
-    figure.subtitle = counted(measure.figures.size(), "participant", "participants");
-    if (analysis.table.simulated) figure.label = "SIMULATED PARTICIPANTS";
-    figure.notes.emplace_back(
-        std::string("Large symbols: means of the group with their 95 % intervals (t)") +
-        (measure.logarithms ? ", geometric" : "") + ". Small symbols: participants.");
+    const bool continues = before != nullptr && before->task == measure.task &&
+                           before->block_name == measure.block_name &&
+                           before->shape == measure.shape;
+    if (!continues) figures.push_back(begin_figure(analysis, measure, figures.size() + 1));
+    before = &measure;
+    Figure& figure = figures.back();
     Panel panel;
+    panel.title = axis_title(measure);
     panel.x = names_axis(measure.groups, measure.groups.size(), "group");
     panel.y = value_axis(measure);
-    panel.width = 130 + 110 * static_cast<double>(measure.groups.size());
+    panel.width = 110 + 110 * static_cast<double>(measure.groups.size());
     panel.height = 260;
     add_people(panel, measure);
+    figure.description += panel.title + ": ";
     add_means(panel, measure, figure.description);
-    for (std::size_t r = 0; measure.renderers.size() > 1 && r < measure.renderers.size(); ++r)
-      figure.legend.push_back(entry_of(measure.renderers[r], r));
     figure.panels.push_back(std::move(panel));
-    figures.push_back(std::move(figure));
   }
   return figures;
 }
