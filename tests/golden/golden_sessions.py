@@ -119,7 +119,8 @@ def serve_lines():
                   ("start", {"stimulus": "box", "level": 25, "renderer": "point", "trial": 3, "orientation_wxyz": [0.6, 0, 0.8, 0]}),
                   ("answer", {"response": "hard"})]),
            *after_session("served")]
-    yield [refused("serve --device simulated --scene none.json"), refused("serve --device falcon --serial 5 --firmware none"),
+    yield [refused("serve --device simulated --group old"), refused("serve --device simulated --fill"),
+           refused("serve --device simulated --scene none.json"), refused("serve --device falcon --serial 5 --firmware none"),
            refused("serve --device touch --library none.so", 1), refused("serve --device inverse3 --service 127.0.0.1:9", 1),
            refused("serve --device falcon2 --serial A"),
            refused("serve --device simulated --protocol none.json"),

@@ -373,7 +373,7 @@ int serve(const po::variables_map& values, station::RunSettings run) {
     if ((values.count(option) > 0) != recorded)
       throw UsageError("expected --protocol, --db and --participant together, or none of them");
   }
-  for (const char* const option : {"number", "session", "consent"}) {
+  for (const char* const option : {"number", "group", "session", "consent"}) {
     if (values.count(option) > 0 && !recorded)
       throw UsageError(std::string("--") + option + ": goes with --protocol");
   }
@@ -391,6 +391,9 @@ int serve(const po::variables_map& values, station::RunSettings run) {
   if (values.count("number") > 0) run.number = values["number"].as<int>();
   if (values.count("session") > 0) run.session = values["session"].as<int>();
   run.new_participant = values["new-participant"].as<bool>();
+  run.group = text_of(values, "group");
+  run.fill = values["fill"].as<bool>();
+  if (run.fill && !recorded) throw UsageError("--fill: goes with --protocol");
   run.no_window = true;
   return serve_session(run, values);
 }
@@ -425,6 +428,8 @@ int serve_command(const std::vector<std::string>& args) {
       ("db", po::value<std::string>()->value_name("FILE"), "the record, as for palpate run")  //
       ("participant", po::value<std::string>()->value_name("CODE"), "as for palpate run")     //
       ("number", po::value<int>()->value_name("N"), "as for palpate run")                     //
+      ("group", po::value<std::string>()->value_name("NAME"), "as for palpate run")           //
+      ("fill", po::bool_switch(), "as for palpate run")                                       //
       ("session", po::value<int>()->value_name("N"), "as for palpate run")                    //
       ("new-participant", po::bool_switch(), "as for palpate run")                            //
       ("consent", po::value<std::string>()->value_name("VERSION"), "as for palpate run")      //
