@@ -7,6 +7,7 @@
 #include <utility>
 #include <variant>
 
+#include "analysis/report/between_report.h"
 #include "analysis/statistics/conclusions.h"
 #include "analysis/statistics/paired_evidence.h"
 #include "analysis/text.h"
@@ -616,6 +617,48 @@ bool has_model(const StudyAnalysis& analysis, const TaskComparison& one) {
         return other.task == one.task && other.block_name == one.block_name &&
                other.shape == one.shape && other.measure == one.measure;
       });
+}
+
+std::string headline(const StudyAnalysis& analysis) {
+  const std::string groups = groups_conclusion(analysis.between_groups);
+  return groups.empty() ? conclusion(analysis) : groups + " " + conclusion(analysis);
+}
+
+std::string explanation(const FunctionSettings& functions) {
+  std::string text =
+      std::string("Intervals are 95 % intervals. Psychometric functions: ") +
+      to_string(functions.shape) + ", lapse rate free up to " + short_number(kMostLapse) +
+      ".\ncompare with levels on both sides of the standard: the same lapse rate at both "
+      "asymptotes; on one\nside: guess rate 1 / intervals, and the ";
+  text += functions.shape == protocols::PsychometricShape::weibull
+              ? "JND is measured half-way from there to certainty (threshold: at 63 %)"
+              : "threshold is half-way from there to certainty";
+  return text +
+         ";\ndetect, same/different: guess rate free. d': log-linear correction.\nBayes: posterior "
+         "mean of the threshold on a grid.\n";
+}
+
+std::string scale_note(const StudyAnalysis& analysis) {
+  const bool unknown =
+      analysis.table.procedures.empty() && !analysis.functions.scale &&
+      std::any_of(analysis.cells.begin(), analysis.cells.end(), [](const auto& cell) {
+        return !cell.functions.empty() && cell.no_function.empty() &&
+               cell.scale == protocols::LevelScale::linear;
+      });
+  const bool numbers = analysis.table.procedures.empty() &&
+                       std::ranges::any_of(analysis.cells, [](const TaskCell& cell) {
+                         return cell.magnitude.has_value();
+                       });
+  std::string text;
+  if (unknown)
+    text +=
+        "A table does not contain the scale of an adaptive procedure's levels: if it is\n"
+        "logarithmic, give --scale log.\n";
+  if (numbers)
+    text +=
+        "A table does not say whether numbers are steps of a labelled scale, for which a power law "
+        "says\nnothing: analyse the database, or give the labels as responses.\n";
+  return text;
 }
 
 std::vector<Table> group_tables(const StudyAnalysis& analysis) {

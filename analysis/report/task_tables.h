@@ -17,6 +17,15 @@ std::string stimulus_of(const std::string& task, const std::string& block,
 /// p < 0.05) or, with one renderer, between rated stimuli; without any comparison the means.
 std::string conclusion(const StudyAnalysis& analysis);
 
+/// What was found: in a study of groups first between them.
+std::string headline(const StudyAnalysis& analysis);
+
+/// How functions were fitted.
+std::string explanation(const FunctionSettings& functions);
+/// Notes on what a table without its protocol does not contain: the scale of levels, and whether
+/// numbers are steps. "": nothing
+std::string scale_note(const StudyAnalysis& analysis);
+
 /// Means over participants with their intervals, and comparisons within participants with their
 /// tests; those without rows are left out.
 std::vector<Table> group_tables(const StudyAnalysis& analysis);
