@@ -14,6 +14,7 @@
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/texts.h"
 #include "runner/commands/shared/command.h"
+#include "runner/commands/validate/protocol_check.h"
 #include "runner/devices/device_delay.h"
 #include "runner/devices/registry.h"
 #include "runner/devices/simulated.h"
@@ -32,8 +33,6 @@
 
 namespace palpate::runner::commands {
 namespace {
-
-constexpr double kTypicalTrial = 10;  // s; a little more than in the paper
 
 /// Builds every mesh of an object, as a session does, and adds its faults.
 void check_meshes(const stimuli::ObjectSpec& object, const std::string& pointer,
@@ -128,7 +127,10 @@ void print_task_summary(const protocols::Protocol& protocol, std::ostream& out) 
   const std::vector<std::string> typed = study::keyboard_parts(protocol);
   if (!typed.empty())
     out << "  keyboard    needed beside a device's buttons for " << list(typed) << "\n";
-  out << "  trials      at most " << trials << " for each participant\n"
+  const Duration duration = duration_of(protocol);
+  out << "  trials      at most " << trials << " for each participant\n  duration    about "
+      << time_in_words(duration.usual) << ", at most " << time_in_words(duration.longest)
+      << "; breaks and pages besides\n"
       << masking(protocol) << "  seed        " << protocol.seed << "\n"
       << "  sha256      " << protocol.sha256 << "\n";
 }
@@ -143,9 +145,8 @@ void print_summary(const protocols::Protocol& protocol, std::ostream& out) {
     renderers.emplace_back(protocols::to_string(kind));
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli) stimuli.push_back(stimulus.name);
   constexpr std::array kOrders = {"in this order", "counterbalanced", "interleaved"};
-  const double rest = protocol.home.rest, time_out = protocol.blocks.front().time_out;
-  const double trial = std::min(kTypicalTrial, time_out);
-  const auto n = static_cast<double>(trials.size());
+  const Duration duration = duration_of(protocol);
+  const double trial = duration.usual / static_cast<double>(trials.size()) - protocol.home.rest;
 
   out << protocol.name << (protocol.title.empty() ? "" : ": " + printable(protocol.title)) << "\n"
       << "  renderers   " << list(renderers) << " ("
@@ -156,8 +157,8 @@ void print_summary(const protocols::Protocol& protocol, std::ostream& out) {
       << trials.size() - static_cast<std::size_t>(counted) << " of practice and warm-up besides\n"
       << "  blocks      " << trials.back().block << ", in " << sessions
       << (sessions == 1 ? " session\n" : " sessions\n") << "  duration    about "
-      << time_in_words(n * (trial + rest)) << " at " << trial << " s a trial, at most "
-      << time_in_words(n * (time_out + rest)) << "; breaks"
+      << time_in_words(duration.usual) << " at " << trial << " s a trial, at most "
+      << time_in_words(duration.longest) << "; breaks"
       << (protocol.practice.criterion ? " and further rounds of practice besides\n" : " besides\n")
       << masking(protocol) << "  seed        " << protocol.seed << "\n"
       << "  sha256      " << protocol.sha256 << "\n";
@@ -173,41 +174,20 @@ void print_verdict(const std::string& what, const std::vector<std::string>& reas
     out << "      " << printable(one.text) << "\n";
 }
 
-/// What a device is told of a protocol before it is opened.
-servo::DeviceConfig config_for(const protocols::Protocol& protocol) {
-  servo::DeviceConfig config;
-  config.rate = protocol.servo_rate;
-  config.stylus_length = protocol.stylus.length;
-  config.stylus_grip = protocol.stylus.grip;
-  return config;
-}
-
 /// Prints whether each kind of device and simulated participants can run the protocol, or why not.
 /// \param measured  delays of devices, which lower the stiffness that they can show
 void print_fitness(const protocols::Protocol& protocol, const StimulusLibrary& library,
                    const std::vector<devices::ChainTiming>& measured, std::ostream& out) {
-  const servo::DeviceConfig config = config_for(protocol);
   out << "  can be shown by (run --device NAME)\n";
-  for (const devices::DeviceKind& kind : devices::device_kinds()) {
-    servo::DeviceCapabilities can = kind.nominal(config);
-    const auto chain = std::ranges::find(measured, kind.name, &devices::ChainTiming::device);
-    if (chain != measured.end())
-      can = devices::with_delay(can, chain->counted(), protocol.servo_rate);
-    protocols::Protocol shown = protocol;
-    const std::vector<session::LimitedMaterial> limited = session::limit_materials(shown, can);
-    print_verdict(kind.name, session::incompatibilities(shown, library, can), limited, out);
-    if (chain != measured.end())
-      out << "      with its delay of " << chain->counted() * 1e3
-          << " ms from pose to force, measured " << printable(chain->made_utc) << "\n";
+  for (const Verdict& verdict : device_verdicts(protocol, library, measured)) {
+    print_verdict(verdict.name, verdict.reasons, verdict.limited, out);
+    if (verdict.chain)
+      out << "      with its delay of " << verdict.chain->counted() * 1e3
+          << " ms from pose to force, measured " << printable(verdict.chain->made_utc) << "\n";
   }
-  const participants::SimulatedSettings settings = participants::load_simulated_settings("");
-  const devices::SimulatedStylus stylus(settings.device, settings.hand, protocol.stylus.length,
-                                        protocol.stylus.grip, 1 / protocol.servo_rate);
-  protocols::Protocol shown = protocol;
-  const std::vector<session::LimitedMaterial> limited =
-      session::limit_materials(shown, stylus.capabilities());
+  const Verdict simulated = simulation_verdict(protocol, library);
   out << "  can be tried with simulated participants\n";
-  print_verdict("simulate", session::simulation_faults(shown, library, settings), limited, out);
+  print_verdict(simulated.name, simulated.reasons, simulated.limited, out);
 }
 
 /// Whether it is a scene: those have no version. Else it is a protocol, or what should be one.
@@ -229,25 +209,52 @@ void add_buzzing(const stimuli::ObjectSpec& object, const std::string& place,
   if (!can.reason.empty()) reasons.push_back(place + " has " + can.reason);
 }
 
-/// Prints which devices can show the materials of a scene, through its tool and reach, or why not.
-void print_scene_fitness(const protocols::SceneSpec& spec, std::ostream& out) {
+/// Which devices can show the materials of a scene, through its tool and reach, or why not.
+std::vector<Verdict> scene_verdicts(const protocols::SceneSpec& spec) {
   const protocols::Protocol shown =
       serve::protocol_of(spec, renderer_for(protocols::RendererKind::ray));
-  const servo::DeviceConfig config = config_for(shown);
-  out << "  materials can be shown by (explore, serve --device NAME)\n";
+  std::vector<Verdict> out;
+  const servo::DeviceConfig config = device_config(shown);
   for (const devices::DeviceKind& kind : devices::device_kinds()) {
     const servo::DeviceCapabilities can = kind.nominal(config);
     if (can.actuated_freedom == 0) continue;
-    std::vector<std::string> reasons;
+    Verdict& verdict = out.emplace_back();
+    verdict.name = kind.name;
     for (std::size_t i = 0; i < spec.objects.size(); ++i)
-      add_buzzing(spec.objects[i], "/objects/" + std::to_string(i), shown, can, reasons);
-    print_verdict(kind.name, reasons, {}, out);
+      add_buzzing(spec.objects[i], "/objects/" + std::to_string(i), shown, can, verdict.reasons);
   }
+  return out;
+}
+
+std::string json_line(const nlohmann::ordered_json& json) {
+  return json.dump(1, ' ', false, nlohmann::ordered_json::error_handler_t::replace) + "\n";
+}
+
+/// \param notes  what there is to say of its objects
+std::string scene_json(const std::string& path, const protocols::SceneSpec& spec,
+                       const std::vector<std::string>& notes) {
+  nlohmann::ordered_json out = faults_json(path, {});
+  out["summary"] = {{"kind", "scene"}, {"objects", spec.objects.size()}};
+  out["notes"] = notes;
+  out["devices"] = nlohmann::ordered_json::array();
+  for (const Verdict& verdict : scene_verdicts(spec)) {
+    nlohmann::ordered_json& one = out["devices"].emplace_back();
+    one = {{"name", verdict.name},
+           {"can", verdict.reasons.empty()},
+           {"reasons", nlohmann::ordered_json::array()}};
+    for (const std::string& reason : verdict.reasons) {
+      // "/objects/0 has ..."
+      const std::string place = reason.substr(0, reason.find(' '));
+      one["reasons"].push_back({{"text", reason}, {"where", {place}}});
+    }
+  }
+  return json_line(out);
 }
 
 /// Checks a scene, or a mesh alone, as both renderers show it.
 /// \throws protocols::InputError, stimuli::MeshError with every fault
-void validate_scene(const std::string& text, const std::string& path, std::ostream& out) {
+void validate_scene(const std::string& text, const std::string& path, bool json,
+                    std::ostream& out) {
   const protocols::SceneSpec spec = protocols::parse_scene_text(text, path);
   std::vector<protocols::Fault> faults;
   SceneBuilder builder;
@@ -257,66 +264,88 @@ void validate_scene(const std::string& text, const std::string& path, std::ostre
   touch::build_scene(builder, path, spec, touch::renderer_named("point"));
   const rendering::Scene scene =
       touch::build_scene(builder, path, spec, touch::renderer_named("ray"));
+  const std::vector<std::string> notes = touch::scene_notes(spec, scene, builder);
+  if (json) {
+    out << scene_json(path, spec, notes);
+    return;
+  }
   out << printable(path) << "\n  objects     " << spec.objects.size() << "\n";
-  for (const std::string& note : touch::scene_notes(spec, scene, builder))
-    out << "  note        " << note << "\n";
+  for (const std::string& note : notes) out << "  note        " << note << "\n";
   for (std::size_t i = 0; i < spec.objects.size(); ++i)
     print_overlaps(spec.objects[i], "/objects/" + std::to_string(i), builder, out);
-  print_scene_fitness(spec, out);
+  out << "  materials can be shown by (explore, serve --device NAME)\n";
+  for (const Verdict& verdict : scene_verdicts(spec))
+    print_verdict(verdict.name, verdict.reasons, {}, out);
   out << "  touch it    palpate explore " << printable(shell_quoted(path)) << "\n";
 }
 
-}  // namespace
-
-int validate_command(const std::vector<std::string>& args) {
-  CommandLine line;
-  line.usage =
-      "palpate validate PROTOCOL.json [--language CODE | --texts] [--calibration FILE]\n"
-      "       palpate validate SCENE.json\n"
-      "       palpate validate MESH.stl";
-  line.summary =
-      "Checks a protocol with its meshes and its schedule, and lists all faults. Lists the\n"
-      "devices that can run it, whether it can be simulated, and the reasons if not.\n"
-      "Or checks a scene, or a mesh file alone: its size in mm, what was cleaned, and which\n"
-      "devices can show its materials without buzzing.";
-  line.example = R"(  palpate validate protocols/ho2000.json
-  palpate validate bunny.stl
-  palpate validate protocols/roughness-magnitude.json --texts > texts.de.json   to be translated
-  palpate validate protocols/roughness-magnitude.json --language de)";
-  std::string language, calibration;
-  bool texts = false;
-  line.options.add_options()  //
-      ("language", boost::program_options::value(&language)->value_name("CODE"),
-       "check the translation of its texts, too: NAME.texts.CODE.json or texts.CODE.json beside "
-       "it")  //
-      ("texts", boost::program_options::bool_switch(&texts),
-       "print only the texts that a participant reads, as JSON")  //
-      ("calibration", boost::program_options::value(&calibration)->value_name("FILE"),
-       "use the delays that `palpate devices --timing --device NAME` stored beside it");
-  line.positional_names = {"PROTOCOL.json"};
-  const auto values = line.parse(args);
-  if (!values) return 0;
-  const auto file = (*values)["PROTOCOL.json"].as<std::string>();
-
-  const std::vector<devices::ChainTiming> measured =
-      calibration.empty() ? std::vector<devices::ChainTiming>()
-                          : devices::stored_chains(devices::chain_file(calibration));
-  if (!calibration.empty() && measured.empty())
+/// The delays that were stored beside a calibration. \throws UsageError
+std::vector<devices::ChainTiming> measured_chains(const std::string& calibration) {
+  if (calibration.empty()) return {};
+  std::vector<devices::ChainTiming> measured =
+      devices::stored_chains(devices::chain_file(calibration));
+  if (measured.empty())
     throw UsageError("--calibration: there is no " + printable(devices::chain_file(calibration)) +
                      "; make it with palpate devices --timing --device NAME --calibration FILE");
+  return measured;
+}
+
+/// What a protocol's stimuli need to be told of, a sentence each.
+std::vector<std::string> notes_on(const protocols::Protocol& protocol, SceneBuilder& builder) {
+  std::vector<std::string> out;
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
+    for (const std::string& note : touch::mesh_notes(stimulus.object, builder))
+      out.push_back("stimulus " + stimulus.name + ": " + note);
+  }
+  return out;
+}
+
+void print_protocol(const protocols::Protocol& protocol, SceneBuilder builder,
+                    const std::vector<devices::ChainTiming>& measured, std::ostream& out) {
+  print_summary(protocol, out);
+  const std::vector<std::string> built_in = protocols::built_in_texts(protocol);
+  if (!built_in.empty())
+    out << "  texts       built in, in English; a protocol in another language gives its own: "
+        << list(built_in) << "\n";
+  for (const std::string& note : notes_on(protocol, builder))
+    out << "  mesh        " << note << "\n";
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
+    print_overlaps(stimulus.object, "stimulus " + stimulus.name, builder, out);
+  const StimulusLibrary library(protocol, std::move(builder));
+  for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
+    const rendering::SoftObject* const soft = library.soft(i);
+    const auto felt = soft != nullptr ? touch::elements_felt(*soft) : std::nullopt;
+    if (felt) out << "  note        stimulus " << protocol.stimuli[i].name << ": " << *felt << "\n";
+  }
+  if (!protocol.groups.any()) print_fitness(protocol, library, measured, out);
+  for (std::size_t i = 0; i < protocol.group_protocols.size(); ++i) {
+    const protocols::Protocol& group = *protocol.group_protocols[i];
+    out << "group " << protocol.groups.names[i] << "\n";
+    print_fitness(group, StimulusLibrary(group), measured, out);
+  }
+}
+
+struct ValidateRequest {
+  std::string file, language;
+  bool texts = false, json = false;
+  const std::vector<devices::ChainTiming>& measured;
+};
+
+/// \throws UsageError, protocols::InputError, stimuli::MeshError with every fault
+void validate_file(const ValidateRequest& request, std::ostream& out) {
+  const std::string& file = request.file;
   const std::string text = protocols::read_scene_text(file);
   if (is_scene(text, file)) {
-    if (texts || !language.empty() || !calibration.empty())
+    if (request.texts || !request.language.empty() || !request.measured.empty())
       throw UsageError(printable(file) +
                        " is no protocol: leave out --texts, --language and --calibration");
-    validate_scene(text, file, std::cout);
-    return 0;
+    return validate_scene(text, file, request.json, out);
   }
   protocols::Protocol protocol = protocols::parse_protocol_text(text, file);
-  if (!language.empty()) protocols::translate(protocol, file, language);
-  if (texts) {
-    std::cout << protocols::texts_json(protocol);
-    return 0;
+  if (!request.language.empty()) protocols::translate(protocol, file, request.language);
+  if (request.texts) {
+    out << protocols::texts_json(protocol);
+    return;
   }
   std::vector<protocols::Fault> faults;
   SceneBuilder builder;
@@ -325,31 +354,64 @@ int validate_command(const std::vector<std::string>& args) {
                  faults);
   }
   if (!faults.empty()) throw protocols::InputError(faults);
-  print_summary(protocol, std::cout);
-  const std::vector<std::string> built_in = protocols::built_in_texts(protocol);
-  if (!built_in.empty())
-    std::cout
-        << "  texts       built in, in English; a protocol in another language gives its own: "
-        << list(built_in) << "\n";
-  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
-    for (const std::string& note : touch::mesh_notes(stimulus.object, builder))
-      std::cout << "  mesh        stimulus " << stimulus.name << ": " << note << "\n";
-    print_overlaps(stimulus.object, "stimulus " + stimulus.name, builder, std::cout);
-  }
+  if (!request.json) return print_protocol(protocol, std::move(builder), request.measured, out);
+  const std::vector<std::string> notes = notes_on(protocol, builder);
   const StimulusLibrary library(protocol, std::move(builder));
-  for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
-    const rendering::SoftObject* const soft = library.soft(i);
-    const auto felt = soft != nullptr ? touch::elements_felt(*soft) : std::nullopt;
-    if (felt)
-      std::cout << "  note        stimulus " << protocol.stimuli[i].name << ": " << *felt << "\n";
+  out << json_line(protocol_json(file, protocol, library, request.measured, notes));
+}
+
+}  // namespace
+
+int validate_command(const std::vector<std::string>& args) {
+  CommandLine line;
+  line.usage =
+      "palpate validate PROTOCOL.json [--language CODE | --texts] [--calibration FILE] [--json]\n"
+      "       palpate validate SCENE.json [--json]\n"
+      "       palpate validate MESH.stl [--json]";
+  line.summary =
+      "Checks a protocol with its meshes and its schedule, and lists all faults. Lists the\n"
+      "devices that can run it, whether it can be simulated, and the reasons if not.\n"
+      "Or checks a scene, or a mesh file alone: its size in mm, what was cleaned, and which\n"
+      "devices can show its materials without buzzing.";
+  line.example = R"(  palpate validate protocols/ho2000.json
+  palpate validate bunny.stl
+  palpate validate protocols/roughness-magnitude.json --texts > texts.de.json   to be translated
+  palpate validate protocols/roughness-magnitude.json --language de
+  palpate validate protocols/ho2000.json --json   for editors and scripts)";
+  std::string language, calibration;
+  bool texts = false, json = false;
+  line.options.add_options()  //
+      ("language", boost::program_options::value(&language)->value_name("CODE"),
+       "check the translation of its texts, too: NAME.texts.CODE.json or texts.CODE.json beside "
+       "it")  //
+      ("texts", boost::program_options::bool_switch(&texts),
+       "print only the texts that a participant reads, as JSON")  //
+      ("json", boost::program_options::bool_switch(&json),
+       "print faults, summary, devices and duration as JSON; exit status 2 with faults")  //
+      ("calibration", boost::program_options::value(&calibration)->value_name("FILE"),
+       "use the delays that `palpate devices --timing --device NAME` stored beside it");
+  line.positional_names = {"PROTOCOL.json"};
+  const auto values = line.parse(args);
+  if (!values) return 0;
+  const auto file = (*values)["PROTOCOL.json"].as<std::string>();
+  if (texts && json) throw UsageError("--json: --texts prints JSON of its own; leave one out");
+  const std::vector<devices::ChainTiming> measured = measured_chains(calibration);
+  const ValidateRequest request{file, language, texts, json, measured};
+  if (!json) {
+    validate_file(request, std::cout);
+    return 0;
   }
-  if (!protocol.groups.any()) print_fitness(protocol, library, measured, std::cout);
-  for (std::size_t i = 0; i < protocol.group_protocols.size(); ++i) {
-    const protocols::Protocol& group = *protocol.group_protocols[i];
-    std::cout << "group " << protocol.groups.names[i] << "\n";
-    print_fitness(group, StimulusLibrary(group), measured, std::cout);
+  std::vector<protocols::Fault> faults;
+  try {
+    validate_file(request, std::cout);
+    return 0;
+  } catch (const protocols::InputError& error) {
+    faults = error.faults();
+  } catch (const stimuli::MeshError& error) {
+    for (const std::string& fault : error.faults()) faults.push_back({file, "", fault});
   }
-  return 0;
+  std::cout << json_line(faults_json(file, faults));
+  return 2;
 }
 
 }  // namespace palpate::runner::commands

@@ -1,0 +1,249 @@
+#include "runner/commands/validate/protocol_check.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <map>
+#include <utility>
+
+#include "protocols/schedule.h"
+#include "protocols/tasks/block_order.h"
+#include "runner/devices/registry.h"
+#include "runner/devices/simulated.h"
+#include "runner/participants/simulated_settings.h"
+#include "runner/session/simulated_study.h"
+#include "runner/study/task_words.h"
+
+namespace palpate::runner::commands {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// s, to feel a stimulus: to identify it, to judge it, to adjust it. The first is a little more than
+// in the paper; the others are guesses of the same kind.
+constexpr double kToIdentify = 10, kToJudge = 5, kToAdjust = 20;
+
+/// Place of a stimulus by its name, or by that with a level, "ball at 405"; "": there is none.
+std::string place_of_stimulus(const std::string& name, const protocols::Protocol& protocol) {
+  for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
+    const std::string& known = protocol.stimuli[i].name;
+    if (name == known || name.starts_with(known + " at ")) return "/stimuli/" + std::to_string(i);
+  }
+  return "";
+}
+
+std::string place_of_renderer(const std::string& name, const protocols::Protocol& protocol) {
+  for (std::size_t i = 0; i < protocol.renderers.size(); ++i) {
+    if (name == protocols::to_string(protocol.renderers[i]))
+      return "/renderers/" + std::to_string(i);
+  }
+  return "";
+}
+
+/// A sentence "stimulus 'ball' has ..." apart: its place, and what it says of it.
+struct SplitReason {
+  std::string where, rest;
+};
+
+SplitReason split(const std::string& reason, const protocols::Protocol& protocol) {
+  for (const bool of_stimulus : {true, false}) {
+    const std::string begin = of_stimulus ? "stimulus '" : "renderer '";
+    if (!reason.starts_with(begin)) continue;
+    const std::size_t end = reason.find('\'', begin.size());
+    if (end == std::string::npos) continue;
+    const std::string name = reason.substr(begin.size(), end - begin.size());
+    std::string rest = reason.substr(end + 1);
+    rest = rest.substr(0, rest.find("; likewise "));
+    return {of_stimulus ? place_of_stimulus(name, protocol) : place_of_renderer(name, protocol),
+            rest};
+  }
+  return {"", reason};
+}
+
+double seconds_of(const protocols::TaskBlock& block) {
+  switch (block.task) {
+    case protocols::TaskKind::identify:
+      return kToIdentify;
+    case protocols::TaskKind::adjust:
+      return kToAdjust;
+    default:
+      return kToJudge;
+  }
+}
+
+/// Stimuli felt in a trial.
+int felt_in_trial(const protocols::TaskBlock& block) {
+  if (block.task == protocols::TaskKind::compare || block.task == protocols::TaskKind::external)
+    return block.intervals;
+  return block.task == protocols::TaskKind::rate && block.standard ? 2 : 1;
+}
+
+Json verdict_json(const Verdict& verdict, const protocols::Protocol& protocol) {
+  Json out{{"name", verdict.name}, {"can", verdict.reasons.empty()}, {"reasons", Json::array()}};
+  for (const GroupedReason& reason : grouped(verdict.reasons, protocol))
+    out["reasons"].push_back({{"text", reason.text}, {"where", reason.where}});
+  if (verdict.reasons.empty() && !verdict.limited.empty()) {
+    for (const session::LimitedMaterial& one : verdict.limited) out["limits"].push_back(one.text);
+  }
+  if (verdict.chain) out["delay_s"] = verdict.chain->counted();
+  return out;
+}
+
+Json block_json(const protocols::Protocol& protocol, const protocols::TaskBlock& block) {
+  Json out{{"name", block.name}, {"task", protocols::to_string(block.task)}};
+  for (const int stimulus : block.stimuli)
+    out["stimuli"].push_back(protocol.stimuli[static_cast<std::size_t>(stimulus)].name);
+  out["session"] = block.session;
+  out["practice"] = block.practice;
+  out["adaptive"] = protocols::is_adaptive(block);
+  out["trials"] = protocols::expected_trials_of(block);
+  out["most_trials"] = protocols::most_trials_of(block);
+  return out;
+}
+
+Json summary_json(const protocols::Protocol& protocol) {
+  Json out{{"kind", "protocol"},
+           {"version", protocol.version},
+           {"name", protocol.name},
+           {"title", protocol.title},
+           {"renderers", Json::array()},
+           {"stimuli", Json::array()},
+           {"sessions", protocol.sessions.count}};
+  for (const protocols::RendererKind kind : protocol.renderers)
+    out["renderers"].push_back(protocols::to_string(kind));
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
+    out["stimuli"].push_back(stimulus.name);
+  long long trials = 0;
+  if (protocols::study_of_shapes(protocol)) {
+    trials = protocols::main_trials(protocol);
+  } else {
+    for (const protocols::TaskBlock& block : protocol.blocks) {
+      out["blocks"].push_back(block_json(protocol, block));
+      if (!block.practice) trials += protocols::expected_trials_of(block);
+    }
+  }
+  out["trials"] = trials;
+  if (protocol.groups.any())
+    out["groups"] = {{"names", protocol.groups.names}, {"assign", to_string(protocol.groups.rule)}};
+  out["seed"] = protocol.seed;
+  out["sha256"] = protocol.sha256;
+  return out;
+}
+
+}  // namespace
+
+servo::DeviceConfig device_config(const protocols::Protocol& protocol) {
+  servo::DeviceConfig config;
+  config.rate = protocol.servo_rate;
+  config.stylus_length = protocol.stylus.length;
+  config.stylus_grip = protocol.stylus.grip;
+  return config;
+}
+
+std::vector<Verdict> device_verdicts(const protocols::Protocol& protocol,
+                                     const StimulusLibrary& library,
+                                     const std::vector<devices::ChainTiming>& measured) {
+  const servo::DeviceConfig config = device_config(protocol);
+  std::vector<Verdict> out;
+  for (const devices::DeviceKind& kind : devices::device_kinds()) {
+    Verdict& verdict = out.emplace_back();
+    verdict.name = kind.name;
+    servo::DeviceCapabilities can = kind.nominal(config);
+    const auto chain = std::ranges::find(measured, kind.name, &devices::ChainTiming::device);
+    if (chain != measured.end()) {
+      verdict.chain = *chain;
+      can = devices::with_delay(can, chain->counted(), protocol.servo_rate);
+    }
+    protocols::Protocol shown = protocol;
+    verdict.limited = session::limit_materials(shown, can);
+    verdict.reasons = session::incompatibilities(shown, library, can);
+  }
+  return out;
+}
+
+Verdict simulation_verdict(const protocols::Protocol& protocol, const StimulusLibrary& library) {
+  const participants::SimulatedSettings settings = participants::load_simulated_settings("");
+  const devices::SimulatedStylus stylus(settings.device, settings.hand, protocol.stylus.length,
+                                        protocol.stylus.grip, 1 / protocol.servo_rate);
+  Verdict out;
+  out.name = "simulate";
+  protocols::Protocol shown = protocol;
+  out.limited = session::limit_materials(shown, stylus.capabilities());
+  out.reasons = session::simulation_faults(shown, library, settings);
+  return out;
+}
+
+std::vector<GroupedReason> grouped(const std::vector<std::string>& reasons,
+                                   const protocols::Protocol& protocol) {
+  std::vector<GroupedReason> out;
+  std::map<std::string, std::size_t> known;  // by what is said
+  for (const std::string& reason : reasons) {
+    const SplitReason parts = split(reason, protocol);
+    const auto [at, is_new] = known.emplace(parts.rest, out.size());
+    if (is_new) out.push_back({reason.substr(0, reason.find("; likewise ")), {}});
+    std::vector<std::string>& where = out[at->second].where;
+    if (!parts.where.empty() && std::ranges::find(where, parts.where) == where.end())
+      where.push_back(parts.where);
+  }
+  return out;
+}
+
+Duration duration_of(const protocols::Protocol& protocol) {
+  Duration out;
+  if (protocols::study_of_shapes(protocol)) {
+    const auto n = static_cast<double>(protocols::schedule(protocol, 1).size());
+    const double time_out = protocol.blocks.front().time_out;
+    out.usual = n * (std::min(kToIdentify, time_out) + protocol.home.rest);
+    out.longest = n * (time_out + protocol.home.rest);
+    return out;
+  }
+  for (const protocols::TaskBlock& block : protocol.blocks) {
+    const double felt = felt_in_trial(block), pauses = (felt - 1) * block.inter_interval;
+    const double one = std::min(seconds_of(block), block.interval_limit.value_or(HUGE_VAL));
+    const double rests = felt * protocol.home.rest + pauses;
+    // The limit of the answer counts from the begin of the last interval.
+    const double before = (felt - 1) * block.interval_limit.value_or(block.time_out);
+    out.usual += static_cast<double>(protocols::expected_trials_of(block)) * (felt * one + rests);
+    out.longest +=
+        static_cast<double>(protocols::most_trials_of(block)) * (before + block.time_out + rests);
+  }
+  return out;
+}
+
+Json faults_json(const std::string& file, const std::vector<protocols::Fault>& faults) {
+  Json out{{"version", 1}, {"file", file}, {"faults", Json::array()}};
+  for (const protocols::Fault& fault : faults)
+    out["faults"].push_back({{"pointer", fault.location},
+                             {"line", fault.line > 0 ? Json(fault.line) : Json(nullptr)},
+                             {"text", fault.expected}});
+  return out;
+}
+
+Json protocol_json(const std::string& file, const protocols::Protocol& protocol,
+                   const StimulusLibrary& library,
+                   const std::vector<devices::ChainTiming>& measured,
+                   const std::vector<std::string>& notes) {
+  Json out = faults_json(file, {});
+  out["summary"] = summary_json(protocol);
+  out["notes"] = notes;
+  out["devices"] = Json::array();
+  const auto add = [&](const protocols::Protocol& shown, const StimulusLibrary& stimuli,
+                       const std::string& group) {
+    std::vector<Verdict> verdicts = device_verdicts(shown, stimuli, measured);
+    verdicts.push_back(simulation_verdict(shown, stimuli));
+    for (const Verdict& verdict : verdicts) {
+      out["devices"].push_back(verdict_json(verdict, shown));
+      if (!group.empty()) out["devices"].back()["group"] = group;
+    }
+  };
+  if (!protocol.groups.any()) add(protocol, library, "");
+  for (std::size_t i = 0; i < protocol.group_protocols.size(); ++i) {
+    const protocols::Protocol& group = *protocol.group_protocols[i];
+    add(group, StimulusLibrary(group), protocol.groups.names[i]);
+  }
+  const Duration duration = duration_of(protocol);
+  out["duration_s"] = duration.usual;
+  out["longest_s"] = duration.longest;
+  return out;
+}
+
+}  // namespace palpate::runner::commands
