@@ -236,7 +236,7 @@ def protocol_lines():
                     *(f"schedule protocols/{name} --participant 3 --format {format_}" for format_ in ("table", "csv", "json")))
     broken = File("broken.json", '{"version": 1, "name": "broken", "renderers": ["line"], "stimuli": [{"shape": "cone"}], "repetitions": 0}')
     yield [*steps("schedule protocols/size-questplus.json --recover 20 --seed 2", "validate protocols/roughness-magnitude.json --texts",
-                  "validate protocols/roughness-magnitude.json --language de"), refused("validate protocols/quick.json --calibration none.json"),
+                  "validate protocols/roughness-magnitude.json --language de", "validate protocols/stiffness-2afc.json --json"), refused("validate protocols/quick.json --calibration none.json"),
            broken, refused("validate broken.json"), refused("simulate broken.json --db broken.db"),
            refused("schedule broken.json --participant 1"),
            refused("run protocols/quick.json --db none.db --participant P01 --device simulated --no-window --group old"),

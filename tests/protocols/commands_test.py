@@ -92,6 +92,46 @@ class Validate(unittest.TestCase):
         self.assertIn("keyboard    needed beside a device's buttons for numbers of 'estimate', 'age' of page 'about-you'\n", said)
         self.assertNotIn("keyboard", run("validate", str(SOURCE / "protocols" / "stiffness-2afc.json")).stdout.decode())
 
+    def test_json_has_faults_summary_devices_and_duration(self):
+        def found(path, *options, status=0):
+            done = run("validate", str(path), "--json", *options)
+            self.assertEqual((done.returncode, done.stderr), (status, b""))
+            return json.loads(done.stdout)
+
+        study = found(SOURCE / "protocols" / "stiffness-2afc.json")
+        self.assertEqual(study["faults"], [])
+        self.assertEqual([one["name"] for one in study["summary"]["blocks"]], ["practice", "constant", "staircases"])
+        self.assertEqual(study["summary"]["stimuli"], ["standard", "comparison"])
+        devices = {one["name"]: one for one in study["devices"]}
+        self.assertTrue(devices["simulated"]["can"] and devices["simulate"]["can"])
+        touch = devices["touch"]
+        self.assertFalse(touch["can"])
+        self.assertEqual(len({one["text"] for one in touch["reasons"]}), len(touch["reasons"]))
+        self.assertLessEqual(len(touch["reasons"]), 3)  # causes, not stimuli and levels
+        for reason in touch["reasons"]:
+            for place in reason["where"]:
+                self.assertRegex(place, r"^/(stimuli|renderers)/\d+$")
+        # 4 + 70 + about 50 trials of two intervals of 5 s, each after 0.5 s of rest, 0.5 s apart
+        self.assertTrue(1000 < study["duration_s"] < 2200 < study["longest_s"], study["duration_s"])
+        shapes = found(HO2000)
+        self.assertEqual((shapes["summary"]["trials"], shapes["summary"]["version"]), (608, 1))
+        self.assertEqual(shapes["duration_s"], 640 * 10.5)
+
+        broken = found(SOURCE / "tests" / "protocols" / "bad" / "v2-groups.json", status=2)
+        self.assertEqual([(one["pointer"], one["line"]) for one in broken["faults"]][:2], [("/groups/names/1", 30), ("/groups/names/2", 31)])
+        self.assertTrue(all(one["text"] for one in broken["faults"]))
+        self.assertEqual(found(SOURCE / "nowhere.json", status=2)["faults"][0]["pointer"], "(file)")
+        with tempfile.TemporaryDirectory() as folder:
+            scene, cut = pathlib.Path(folder) / "scene.json", pathlib.Path(folder) / "cut.json"
+            scene.write_text('{"objects": [{"shape": "cube", "edge_m": 0.03, "stiffness_n_per_m": 90000}]}')
+            told = found(scene)
+            self.assertEqual(told["summary"], {"kind": "scene", "objects": 1})
+            falcon, = [one for one in told["devices"] if one["name"] == "falcon2"]
+            self.assertEqual((falcon["can"], falcon["reasons"][0]["where"]), (False, ["/objects/0"]))
+            cut.write_text('{"version": 2,')
+            self.assertEqual(found(cut, status=2)["faults"][0]["pointer"], "line 1, column 15")
+        self.assertEqual(run("validate", HO2000, "--json", "--texts").returncode, 2)
+
     def test_a_scene_or_a_mesh_alone_is_checked(self):
         mesh = SOURCE / "tests" / "protocols" / "good" / "tetrahedron.obj"
         with tempfile.TemporaryDirectory() as folder:
