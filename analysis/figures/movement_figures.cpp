@@ -15,7 +15,7 @@
 namespace palpate::analysis {
 namespace {
 
-constexpr std::size_t kMostShapes = 8, kMostRenderers = 4;
+constexpr std::size_t kMostDrawnShapes = 8, kMostRenderers = 4;
 constexpr double kMm = 1000;  // of a metre
 
 Role role_of(const std::string& renderer, std::size_t index) {
@@ -29,7 +29,7 @@ class Drawer {
   Drawer(const MovementTable& table, const MovementPictures& pictures)
       : table_(table),
         pictures_(pictures),
-        shapes_(std::min(table.trials.shapes.size(), kMostShapes)),
+        shapes_(std::min(table.trials.shapes.size(), kMostDrawnShapes)),
         renderers_(std::min(table.trials.renderers.size(), kMostRenderers)) {}
 
   Figure paths() const;

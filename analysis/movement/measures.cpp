@@ -18,7 +18,7 @@ std::size_t ticks_of(double seconds, double rate) {
   return std::max<std::size_t>(1, static_cast<std::size_t>(std::llround(seconds * rate)));
 }
 // Lets a duration equal to the limit pass despite rounding.
-constexpr double kRounding = 1e-9;
+constexpr double kMeasureRounding = 1e-9;
 
 using enum MeasureScale;
 using Values = std::vector<double>;
@@ -199,13 +199,13 @@ std::vector<Stretch> contact_episodes(const std::vector<bool>& contact, double r
   constexpr double kGap = 0.05, kShortest = 0.02;
   std::vector<Stretch> joined;
   for (const Stretch& one : stretches(contact)) {
-    if (!joined.empty() && seconds(one.begin - joined.back().end, rate) < kGap - kRounding)
+    if (!joined.empty() && seconds(one.begin - joined.back().end, rate) < kGap - kMeasureRounding)
       joined.back().end = one.end;
     else
       joined.push_back(one);
   }
   std::erase_if(joined, [rate](const Stretch& one) {
-    return seconds(one.size(), rate) < kShortest - kRounding;
+    return seconds(one.size(), rate) < kShortest - kMeasureRounding;
   });
   return joined;
 }
@@ -217,7 +217,7 @@ std::vector<Stretch> stops(const std::vector<bool>& contact, const std::vector<d
   for (std::size_t i = 0; i < slow.size(); ++i) slow[i] = contact[i] && speed[i] < kSlow;
   std::vector<Stretch> found = stretches(slow);
   std::erase_if(found, [rate](const Stretch& one) {
-    return seconds(one.size(), rate) < kShortest - kRounding;
+    return seconds(one.size(), rate) < kShortest - kMeasureRounding;
   });
   return found;
 }

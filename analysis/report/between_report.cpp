@@ -127,14 +127,14 @@ std::string title_of(const GroupedMeasure& of) {
 }
 
 /// On the scale of the figures: of logarithms their exponential.
-std::string on_scale(const GroupedMeasure& of, const std::optional<double>& value) {
+std::string figure_text(const GroupedMeasure& of, const std::optional<double>& value) {
   return value ? short_number(of.logarithms ? std::exp(*value) : *value) : kMissing;
 }
 
-std::string on_scale(const GroupedMeasure& of, const std::optional<Interval>& interval) {
+std::string figure_text(const GroupedMeasure& of, const std::optional<Interval>& interval) {
   if (!interval) return kMissing;
-  return "[" + on_scale(of, std::optional(interval->low)) + ", " +
-         on_scale(of, std::optional(interval->high)) + "]";
+  return "[" + figure_text(of, std::optional(interval->low)) + ", " +
+         figure_text(of, std::optional(interval->high)) + "]";
 }
 
 std::string condition_of(const GroupedMeasure& of, const std::optional<std::size_t>& condition) {
@@ -166,7 +166,7 @@ std::string f_test_text(const GroupEffect& effect) {
 std::string group_contrast_text(const GroupedMeasure& of, const GroupContrast& one) {
   std::string text = group_contrast_name(of, one);
   if (!one.of_difference && of.renderers.size() > 1) text += ", " + condition_of(of, one.condition);
-  text += ": " + on_scale(of, one.estimate) + " " + on_scale(of, one.ci95);
+  text += ": " + figure_text(of, one.estimate) + " " + figure_text(of, one.ci95);
   if (!one.t) return text + " (" + one.undefined + ")";
   text += ", t(" + short_number(*one.df) + ") = " + fixed(*one.t, 2) + ", " + p_phrase(*one.p);
   if (one.p_holm && of.result.contrasts.size() > 1)
@@ -187,7 +187,8 @@ Table group_means_table(const GroupedMeasure& of, const std::string& label) {
   out.n_names = 2;
   for (const GroupMarginal& one : of.result.marginals) {
     out.rows.push_back({printable(of.groups[one.group]), condition_of(of, one.condition),
-                        std::to_string(one.n), on_scale(of, one.mean), on_scale(of, one.ci95)});
+                        std::to_string(one.n), figure_text(of, one.mean),
+                        figure_text(of, one.ci95)});
   }
   if (of.logarithms) out.notes.emplace_back("Geometric means over participants.");
   if (!of.result.dropped.empty()) {
@@ -244,7 +245,7 @@ Table group_contrasts_table(const GroupedMeasure& of, const std::string& label) 
   for (const GroupContrast& one : of.result.contrasts) {
     out.rows.push_back(
         {group_contrast_name(of, one), one.of_difference ? "" : condition_of(of, one.condition),
-         on_scale(of, one.estimate), on_scale(of, one.ci95), number(one.t, 2),
+         figure_text(of, one.estimate), figure_text(of, one.ci95), number(one.t, 2),
          one.df ? short_number(*one.df) : kMissing, p_or_missing(one.p), p_or_missing(one.p_holm)});
     if (!one.undefined.empty())
       out.notes.push_back(group_contrast_name(of, one) + ": " + one.undefined + ".");
@@ -288,8 +289,8 @@ std::string groups_text(const std::vector<GroupedMeasure>& measures) {
     if (!one.result.anova.undefined.empty()) text += "  " + one.result.anova.undefined + "\n";
     for (const GroupMarginal& mean : one.result.marginals) {
       text += "  " + printable(one.groups[mean.group]) + ", " + condition_of(one, mean.condition) +
-              ": " + on_scale(one, mean.mean) + (one.unit.empty() ? "" : " " + one.unit) + " " +
-              on_scale(one, mean.ci95) + "\n";
+              ": " + figure_text(one, mean.mean) + (one.unit.empty() ? "" : " " + one.unit) + " " +
+              figure_text(one, mean.ci95) + "\n";
     }
     for (const GroupEffect& effect : one.result.anova.effects)
       text += "  " + effect.name + ": " + f_test_text(effect) + "\n";

@@ -147,7 +147,7 @@ using protocols::ObjectReader;
 using protocols::Presence;
 
 // Limits of what is read; those of 'palpate plan' are narrower or the same.
-constexpr double kMostSd = 100;  // log seconds
+constexpr double kMostPlannedSd = 100;  // log seconds
 constexpr double kMostParticipants = 10'000, kMostTrials = 10'000, kMostStudies = 10'000'000;
 constexpr std::size_t kMostShapes = 1'000, kMostCurves = 10'000, kMostLabel = 10'000;
 
@@ -237,40 +237,40 @@ StudyModel read_times(ObjectReader& reader) {
       for (const auto& [shape, value] : ratios->items()) {
         model.shapes.push_back(shape);
         protocols::read_number(value, inner.pointer(shape), model.log_ratios.emplace_back(),
-                               {-kMostSd, kMostSd}, reader.faults());
+                               {-kMostPlannedSd, kMostPlannedSd}, reader.faults());
       }
     }
   }
-  reader.number("gain_sd", model.gain_sd, {0, kMostSd}, Presence::required);
-  reader.number("shape_gain_sd", model.shape_gain_sd, {0, kMostSd}, Presence::required);
-  reader.number("intercept_sd", model.intercept_sd, {0, kMostSd}, Presence::required);
+  reader.number("gain_sd", model.gain_sd, {0, kMostPlannedSd}, Presence::required);
+  reader.number("shape_gain_sd", model.shape_gain_sd, {0, kMostPlannedSd}, Presence::required);
+  reader.number("intercept_sd", model.intercept_sd, {0, kMostPlannedSd}, Presence::required);
   reader.number("correlation", model.correlation, {-1, 1}, Presence::required);
-  reader.number("residual_sd", model.residual_sd, {0, kMostSd}, Presence::required);
+  reader.number("residual_sd", model.residual_sd, {0, kMostPlannedSd}, Presence::required);
   reader.number("share_used", model.proportion_used, {0, 1}, Presence::required);
   return model;
 }
 
-constexpr std::array kMeasures = {PlannedMeasure::jnd,       PlannedMeasure::pse,
-                                  PlannedMeasure::threshold, PlannedMeasure::accuracy,
-                                  PlannedMeasure::rating,    PlannedMeasure::exponent};
+constexpr std::array kPlannedMeasures = {PlannedMeasure::jnd,       PlannedMeasure::pse,
+                                         PlannedMeasure::threshold, PlannedMeasure::accuracy,
+                                         PlannedMeasure::rating,    PlannedMeasure::exponent};
 
 ThresholdStudy read_measure(ObjectReader& reader) {
   ThresholdStudy study;
   std::vector<std::pair<const char*, PlannedMeasure>> names;
-  names.reserve(kMeasures.size());
-  for (const PlannedMeasure one : kMeasures) names.emplace_back(to_string(one), one);
+  names.reserve(kPlannedMeasures.size());
+  for (const PlannedMeasure one : kPlannedMeasures) names.emplace_back(to_string(one), one);
   reader.choice("measure", study.measure, names, Presence::required);
-  reader.number("effect", study.effect, {-kMostSd, kMostSd}, Presence::required);
-  reader.number("effect_sd", study.effect_sd, {0, kMostSd}, Presence::required);
-  reader.number("participant_sd", study.participant_sd, {0, kMostSd}, Presence::required);
+  reader.number("effect", study.effect, {-kMostPlannedSd, kMostPlannedSd}, Presence::required);
+  reader.number("effect_sd", study.effect_sd, {0, kMostPlannedSd}, Presence::required);
+  reader.number("participant_sd", study.participant_sd, {0, kMostPlannedSd}, Presence::required);
   reader.number("weber_fraction", study.weber_fraction, {0, 10, "", true}, Presence::required);
-  reader.number("pse_sd_jnd", study.pse_sd, {0, kMostSd}, Presence::required);
+  reader.number("pse_sd_jnd", study.pse_sd, {0, kMostPlannedSd}, Presence::required);
   reader.number("accuracy", study.accuracy, {0.01, 0.99}, Presence::required);
-  reader.number("rating_sd", study.rating_sd, {0, kMostSd}, Presence::required);
-  reader.number("number_sd", study.number_sd, {0, kMostSd}, Presence::required);
+  reader.number("rating_sd", study.rating_sd, {0, kMostPlannedSd}, Presence::required);
+  reader.number("number_sd", study.number_sd, {0, kMostPlannedSd}, Presence::required);
   reader.number("lapse", study.lapse, {0, 0.5}, Presence::required);
-  reader.number("reach_jnd", study.reach, {0, kMostSd}, Presence::required);
-  reader.number("equivalence_bound", study.bound, {0, kMostSd});
+  reader.number("reach_jnd", study.reach, {0, kMostPlannedSd}, Presence::required);
+  reader.number("equivalence_bound", study.bound, {0, kMostPlannedSd});
   return study;
 }
 

@@ -33,7 +33,7 @@ void put_line(std::string& out, const std::string& text, const std::string& inde
   }
 }
 
-constexpr std::size_t kNameColumns = 14, kNumberColumns = 12, kWidestShape = 24;
+constexpr std::size_t kPlanNameColumns = 14, kNumberColumns = 12, kWidestShape = 24;
 
 std::string column_name(const Plan& plan, std::size_t shape) {
   return "  " +
@@ -43,11 +43,12 @@ std::string column_name(const Plan& plan, std::size_t shape) {
 /// Appends the table of a curve, restricted to the columns of these shapes.
 void put_columns(std::string& out, const Plan& plan, const PlanCurve& curve,
                  std::span<const std::size_t> shapes) {
-  out += "  " + pad_right("participants", kNameColumns) + pad_left("goal", kNumberColumns);
+  out += "  " + pad_right("participants", kPlanNameColumns) + pad_left("goal", kNumberColumns);
   for (const std::size_t s : shapes) out += column_name(plan, s);
   out += "\n";
   for (const PlanPoint& point : curve.points) {
-    std::string line = "  " + pad_right(std::to_string(point.design.participants), kNameColumns) +
+    std::string line = "  " +
+                       pad_right(std::to_string(point.design.participants), kPlanNameColumns) +
                        pad_left(percent(goal_power(plan, point.power)), kNumberColumns);
     for (const std::size_t s : shapes) {
       line += pad_left(percent(point.power.proportion(point.power.found[s])),
@@ -63,7 +64,7 @@ void put_columns(std::string& out, const Plan& plan, const PlanCurve& curve,
 /// Appends the table of a curve: shapes with an effect first, split where it is too wide.
 void put_curve(std::string& out, const Plan& plan, const PlanCurve& curve) {
   constexpr std::size_t kShapeColumns =
-      87 - 2 - kNameColumns - kNumberColumns;  // columns, without those of "<- enough"
+      87 - 2 - kPlanNameColumns - kNumberColumns;  // columns, without those of "<- enough"
   out += "\n";
   put_line(out, "Power with " + counted(curve.trials, "trial", "trials") +
                     " of each shape with each renderer (" +
