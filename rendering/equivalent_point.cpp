@@ -261,9 +261,13 @@ void place_along_border(const stimuli::ConvexMesh& mesh, const WalkResult& hit, 
   if (std::abs(slope) >= tick::kSinBlendAngle * length) return;
   const double angle = turned(slope, length);
   tick::Portion portion;
-  for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
-    const stimuli::Side& side = mesh.sides()[i];
-    portion.clip(glm::dot(side.inward, tip) - side.offset + slack, glm::dot(side.inward, d));
+  if (facet.side_count > tick::kClippedOneByOne) {
+    portion.clip_by_many(mesh, index, tip, d, slack);
+  } else {
+    for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
+      const stimuli::Side& side = mesh.sides()[i];
+      portion.clip(glm::dot(side.inward, tip) - side.offset + slack, glm::dot(side.inward, d));
+    }
   }
   if (!(portion.enter <= portion.leave)) return;
   c.probe_fraction = 0.5 * ((1 + angle) * portion.enter + (1 - angle) * portion.leave);

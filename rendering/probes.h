@@ -80,6 +80,9 @@ inline double small_asin(double x) {
   return x * (1 + x2 * (1.0 / 6 + x2 * (3.0 / 40 + x2 * (5.0 / 112))));
 }
 
+/// A facet with more sides is clipped by bisection (tests/rendering/RESULTS.md).
+inline constexpr std::uint32_t kClippedOneByOne = 128;
+
 /// Part of a segment a + t d, 0 <= t <= 1: clipped by half-spaces.
 struct Portion {
   double enter = 0, leave = 1;
@@ -95,6 +98,12 @@ struct Portion {
     const double all = ((slope == 0) & (height < 0)) ? -1.0 : 1.0;
     leave = all < leave ? all : leave;
   }
+
+  /// Clips by all sides of a facet, by bisection: the same bits as side by side, quicker from some
+  /// hundred sides on.
+  /// \param slack  m, by which the sides are moved outwards
+  void clip_by_many(const stimuli::ConvexMesh& mesh, std::uint32_t facet, const Vec3& tip,
+                    const Vec3& d, double slack);
 };
 
 /// The portion over the facet's polygon of a probe that lies on the facet; enter > leave if
@@ -111,6 +120,10 @@ inline Portion touching_portion(const stimuli::ConvexMesh& mesh, std::uint32_t i
       const stimuli::Facet& across = mesh.facets()[next.across];
       portion.clip(across.offset - glm::dot(across.normal, a), -glm::dot(across.normal, along));
     }
+    return portion;
+  }
+  if (facet.side_count > kClippedOneByOne) {
+    portion.clip_by_many(mesh, index, ideal_tip, d, 0);
     return portion;
   }
   for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
