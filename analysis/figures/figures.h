@@ -148,8 +148,6 @@ std::vector<Figure> task_figures(const StudyAnalysis& analysis);
 /// with their intervals, and every participant.
 std::vector<Figure> between_figures(const StudyAnalysis& analysis);
 
-// Figures of movement.
-
 /// The figures for which there are data: movement-paths (a typical trial on three views of its
 /// object), movement-contact (where surfaces were touched), movement-speed (speed over time with
 /// movements and contact), movement-coverage (share of the surface over time), movement-procedures
@@ -160,8 +158,6 @@ std::vector<Figure> movement_figures(const MovementTable& table, const MovementP
 /// Mean over participants' means of an untransformed share; none: no trial has it.
 std::optional<double> mean_share(const MovementTable& table, std::size_t measure,
                                  std::size_t renderer, std::size_t shape);
-
-// Figures of a sweep.
 
 /// gains: each shape's gain over the space, with the paper's; drivers: their strongest drivers;
 /// scatter: each shape's gain over its strongest driver. Only figures with data.

@@ -35,8 +35,6 @@ void put_reduction_cards(std::string& out, const Analysis& analysis);
 /// The analysis as one HTML page (HtmlPage): conclusion, warnings, figures, tables and provenance.
 std::string report_html(const Analysis& analysis, const StudyRecord& record);
 
-// Of the tasks of a study of version 2.
-
 /// The analysis of the tasks of a study of version 2, for a terminal.
 std::string task_report_text(const StudyAnalysis& analysis);
 /// The same as an HTML page with the figures.
@@ -45,8 +43,6 @@ std::string task_report_html(const StudyAnalysis& analysis, const std::string& p
                              const StudyRecord& record = {});
 /// Every number, 17 significant digits. An infinite end of an interval is null.
 std::string task_report_json(const StudyAnalysis& analysis, const std::string& program_version);
-
-// Of movement.
 
 /// Runs every analysis on the table.
 MovementAnalysis analyze_movement(MovementTable table, const std::string& program_version);
@@ -57,8 +53,6 @@ std::string movement_text(const MovementAnalysis& analysis);
 std::string movement_json(const MovementAnalysis& analysis);
 /// A self-contained page with the figures and their description in words.
 std::string movement_html(const MovementAnalysis& analysis, const MovementPictures& pictures);
-
-// Of a sweep.
 
 /// Gains over the space, what each depends on, why points failed.
 std::vector<Table> sweep_tables(const SweepAnalysis& analysis);

@@ -55,8 +55,6 @@ inline Floats of_bits(const Ints& x) { return reinterpret_cast<Floats>(x); }
 inline float to_floats(std::int32_t x) { return static_cast<float>(x); }
 inline Floats to_floats(const Ints& x) { return __builtin_convertvector(x, Floats); }
 
-// Of one float, or of each lane.
-
 /// e^x for x <= 88. Relative error below 3e-7; clamped to e^-87 below x = -87.
 template <class T>
 inline T exp(T x) {
