@@ -25,6 +25,8 @@ struct PlanOptions {
 /// The options that a plan's powers depend on.
 void add_plan_options(CommandLine& line, PlanOptions& options);
 
+// Each throws UsageError.
+
 /// The pilot's model, or the paper's shapes with the given figures.
 analysis::Pilot starting_point(const PlanOptions& options,
                                const boost::program_options::variables_map& values);
