@@ -122,7 +122,7 @@ PUBLIC = {
     "data/merge": "merge",
     "analysis": "text",
     "analysis/input": "csv_reader trials study_record study_table sweep_table",
-    "analysis/statistics": "analysis comparison conclusions describe group_simulation interval_coverage jobs mixed_model "
+    "analysis/statistics": "analysis comparison conclusions describe group_power group_simulation interval_coverage jobs mixed_model "
                            "paired paired_evidence pattern power plan quantiles sensitivity "
                            "study_groups sweep_analysis task_analysis threshold_plan",
     "analysis/movement": "comparison measures pictures",

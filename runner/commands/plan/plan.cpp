@@ -22,6 +22,7 @@
 #include "analysis/text.h"
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
+#include "runner/commands/plan/plan_groups.h"
 #include "runner/commands/shared/command.h"
 #include "runner/output/outputs.h"
 #include "runner/output/progress_line.h"
@@ -526,6 +527,7 @@ int plan_command(const std::vector<std::string>& args) {
        palpate plan (--jnd-effect PERCENT | --pse-effect JNDS | --threshold-effect PERCENT |
            --accuracy-effect POINTS | --rating-effect STEPS | --exponent-effect PERCENT)
            [--equivalence BOUND]
+       palpate plan --groups N (--effect-between PERCENT | --effect-interaction PERCENT) ...
        palpate plan --coverage [--studies N] [--seed S])";
   line.summary =
       "Sample size planning: the number of participants and trials that find an effect with a\n"
@@ -536,11 +538,14 @@ int plan_command(const std::vector<std::string>& args) {
   palpate plan --gain-sd 0.15 --residual-sd 0.5 --effect cone=15 --participants 4-60 \
       --trials 20,40 --json plan.json --figure power.svg
   palpate plan --jnd-effect 20 --weber 0.1 --trials 70,140 --participants 6-30   (thresholds)
+  palpate plan --groups 2 --effect-between 20 --gain-sd 0.15 --residual-sd 0.5 --participants 4-60
   palpate plan --coverage --studies 500 --seed 1)";
   PlanOptions options;
   add_plan_options(line, options);
   ThresholdOptions thresholds;
   add_threshold_options(line, thresholds);
+  GroupOptions groups;
+  add_group_options(line, groups);
   auto add = line.options.add_options();
   add("jobs", po::value(&options.jobs)->value_name("J"), "threads; default: one a core");
   add("json", po::value(&options.json)->value_name("FILE"), "write every number as JSON");
@@ -561,6 +566,14 @@ int plan_command(const std::vector<std::string>& args) {
   if (values->count("coverage")) {
     print_coverage(options, *values, outputs);
     return 0;
+  }
+  if (values->count("groups")) {
+    print_group_plan(groups, options, *values, outputs);
+    return 0;
+  }
+  for (const char* const option : {"effect-between", "effect-interaction"}) {
+    if (values->count(option))
+      throw UsageError(std::string("--") + option + ": goes with --groups");
   }
   for (const MeasureOption& one : kMeasureOptions) {
     if (values->count(one.name) == 0) continue;

@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <boost/math/distributions/non_central_t.hpp>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <cstdint>
 #include <fstream>
@@ -11,6 +13,7 @@
 
 #include "analysis/statistics/between_groups.h"
 #include "analysis/statistics/describe.h"
+#include "analysis/statistics/group_power.h"
 #include "analysis/statistics/mixed_anova.h"
 #include "analysis/statistics/mixed_model.h"
 #include "data/base/random.h"
@@ -275,6 +278,59 @@ TEST(BetweenGroups, IntervalsCoverTheTruth) {
     EXPECT_GE(covered, 0.92 * kStudies);
     EXPECT_LE(covered, 0.97 * kStudies + 5);
   }
+}
+
+/// The test of two groups is a t test of participants' means, whose power has a closed form.
+TEST(GroupPower, IsThatOfNoncentralT) {
+  StudyModel model;
+  model.shapes = {"cone", "cube"};
+  model.log_ratios = {0.1, 0};
+  model.intercept_sd = 0.3;
+  model.gain_sd = 0.2;
+  model.residual_sd = 0.5;
+  constexpr std::size_t kTrials = 40, kPeople = 12;
+  const double noise = model.residual_sd * model.residual_sd / kTrials;
+  // Of the mean over renderers, and of their difference.
+  const double sd_mean = std::sqrt(0.3 * 0.3 + 0.2 * 0.2 / 4 + noise / 2);
+  const double sd_gain = std::sqrt(0.2 * 0.2 + 2 * noise);
+  const auto expected = [&](double effect, double sd) {
+    const double df = 2 * kPeople - 2, shift = effect / (sd * std::sqrt(2.0 / kPeople));
+    const double critical = quantile(boost::math::students_t(df), 0.975);
+    const boost::math::non_central_t distribution(df, shift);
+    return cdf(complement(distribution, critical)) + cdf(distribution, -critical);
+  };
+  for (const std::uint64_t seed : {1U, 2U}) {
+    PowerSettings settings;
+    settings.studies = 4000;
+    settings.seed = seed;
+    const GroupPower found = simulate_group_power(model, {2, 0.3, 0.2}, kPeople, kTrials, settings);
+    EXPECT_NEAR(found.share(found.group), expected(0.3, sd_mean), 0.03);
+    EXPECT_NEAR(found.share(found.interaction), expected(0.2, sd_gain), 0.03);
+    const GroupPower none = simulate_group_power(model, {3, 0, 0}, kPeople, kTrials, settings);
+    EXPECT_NEAR(none.share(none.group), 0.05, 0.015);
+    EXPECT_NEAR(none.share(none.interaction), 0.05, 0.015);
+  }
+}
+
+TEST(GroupPower, PlansTheFewestThatReachThePower) {
+  StudyModel model;
+  model.shapes = {"cone"};
+  model.log_ratios = {0};
+  model.intercept_sd = 0.3;
+  model.residual_sd = 0.5;
+  PowerSettings settings;
+  settings.studies = 500;
+  const GroupEffects effects{2, 0.4, 0};
+  const std::vector<GroupPower> points =
+      plan_groups(model, effects, 2, 100, 40, 0.8, settings, [](std::size_t) {});
+  const auto first = std::ranges::find_if(
+      points, [&](const GroupPower& one) { return reaches(one, effects, 0.8); });
+  ASSERT_NE(first, points.end());
+  ASSERT_NE(first, points.begin());
+  EXPECT_EQ(std::prev(first)->participants + 1, first->participants);
+  EXPECT_FALSE(
+      reaches(plan_groups(model, effects, 2, 3, 40, 0.8, settings, [](std::size_t) {}).back(),
+              effects, 0.8));
 }
 
 TEST(BetweenGroups, SmallGroupsSayWhy) {
