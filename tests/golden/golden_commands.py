@@ -221,6 +221,7 @@ def registration_lines():
     yield [RATING, HARDER, ABOUT,
            *steps("plan --exponent-effect 30 --trials 28 --participants 8-9 --studies 100 --json exponent.json",
                   "plan --rating-effect 1.5 --trials 4 --participants 6-8 --studies 100 --json plan.json",
+                  "plan --groups 2 --effect-interaction 15 --gain-sd 0.15 --residual-sd 0.5 --participants 4-40 --studies 200 --json groups.json",
                   "register hard.json --plan plan.json --hypotheses harder.json --participants 6 --out registration --studies 20",
                   "schedule hard.json --participant 2 --format order", "schedule protocols/quick.json --participant 1 --format order",
                   "schedule protocols/stiffness-2afc.json --participant 1 --format order",
