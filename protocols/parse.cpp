@@ -411,35 +411,41 @@ Protocol read_design(const json& root, const MeshFiles& files, FaultList& faults
   return protocol;
 }
 
-/// \throws InputError with the faults of all groups
+/// Adds a fault of a group's protocol: at its place in the patch, or else at the patch.
+void add_group_fault(const Fault& fault, const std::string& group, const json& patch,
+                     FaultList& faults) {
+  const std::string place = child_pointer("/groups/patch", group);
+  const bool in_patch =
+      fault.location.starts_with('/') && patch.contains(json::json_pointer(fault.location));
+  faults.add(in_patch ? place + fault.location : place,
+             "in group '" + group + "'" + (in_patch ? "" : ", at " + fault.location) + ": " +
+                 fault.expected);
+}
+
+/// Makes the protocol of each group.
 void add_group_protocols(const json& root, const std::vector<json>& patches, const MeshFiles& files,
-                         const std::string& file_name, Protocol& protocol) {
-  std::vector<Fault> faults;
-  std::vector<std::shared_ptr<const Protocol>> all;
+                         FaultList& faults, Protocol& protocol) {
   for (std::size_t i = 0; i < patches.size(); ++i) {
     json patched = root;
     patched.merge_patch(patches[i]);
     patched.erase("groups");
-    FaultList own(file_name);
+    FaultList own(faults.file());
     std::vector<json> none;
     auto group = std::make_shared<Protocol>();
     try {
       *group = read_design(patched, files, own, none);
       own.throw_if_any();
     } catch (const InputError& error) {
-      for (Fault fault : error.faults()) {
-        fault.expected = "in group '" + protocol.groups.names[i] + "': " + fault.expected;
-        faults.push_back(std::move(fault));
-      }
+      for (const Fault& fault : error.faults())
+        add_group_fault(fault, protocol.groups.names[i], patches[i], faults);
       continue;
     }
     group->groups = protocol.groups;
     group->source_text = protocol.source_text;
     group->sha256 = protocol.sha256;
-    all.push_back(std::move(group));
+    protocol.group_protocols.push_back(std::move(group));
   }
-  if (!faults.empty()) throw InputError(std::move(faults));
-  protocol.group_protocols = std::move(all);
+  faults.throw_if_any();
 }
 
 }  // namespace
@@ -461,7 +467,7 @@ Protocol parse_protocol_text(const std::string& text, const std::string& file_na
   faults.throw_if_any();
   protocol.source_text = text;
   protocol.sha256 = checksum_hex(text);
-  add_group_protocols(root, patches, files, file_name, protocol);
+  add_group_protocols(root, patches, files, faults, protocol);
   return protocol;
 }
 

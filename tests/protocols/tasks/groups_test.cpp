@@ -89,7 +89,7 @@ TEST(Groups, FaultsNameTheGroup) {
   const std::vector<Fault> faults =
       faults_when([&] { parse_protocol_text(study.dump(), "study.json"); });
   ASSERT_FALSE(faults.empty());
-  EXPECT_EQ(faults[0].location, "/renderers/0");
+  EXPECT_EQ(faults[0].location, "/groups/patch/old/renderers/0");
   EXPECT_EQ(faults[0].expected.rfind("in group 'old': expected one of", 0), 0U)
       << faults[0].expected;
 }

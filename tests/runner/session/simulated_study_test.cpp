@@ -96,31 +96,32 @@ TEST_F(SimulatedStudy, IsTheSameHoweverOftenItIsStopped) {
   const auto began = Clock::now();
   simulate(p, folder_ / "whole.db", 2);
   const auto whole = std::chrono::duration_cast<std::chrono::microseconds>(Clock::now() - began);
-  const fs::path db = folder_ / "stopped.db";
-  constexpr std::uint64_t kSeed = 11;
-  Random random(kSeed);
-  int stops = 0;
-  for (bool done = false; !done;) {
-    ASSERT_LT(stops, 1000);
-    data::Store store = data::Store::open(db, data::Store::Mode::write_or_create);
-    std::atomic<bool> stop{false};
-    // A stop before the first report still finishes and records the current trials. Stop later at
-    // times: on a machine that has become busy a quarter of the study's time may be too short to
-    // begin.
-    const double longest = static_cast<double>(whole.count()) * (0.25 + 0.01 * stops);
-    std::jthread stopper(
-        [&, after = std::chrono::microseconds(static_cast<std::int64_t>(random.unit() * longest))] {
-          std::this_thread::sleep_for(after);
-          stop = true;
-        });
-    const StudyProgress progress =
-        simulate_study(p, store, participants::load_simulated_settings(""),
-                       {.numbers = first_numbers(3), .seed = 1, .jobs = 2}, stop, {});
-    done = progress.recorded == progress.expected;
-    ++stops;
+  Random random(11);
+  int interrupted = 0;
+  // A machine that has become quicker finishes before the stop: then with shorter times again.
+  for (double share = 0.25; interrupted == 0; share /= 2) {
+    ASSERT_GT(share, 1e-6) << "nothing was interrupted";
+    const fs::path db = folder_ / ("stopped " + std::to_string(share) + ".db");
+    int stops = 0;
+    for (bool done = false; !done; ++stops) {
+      ASSERT_LT(stops, 1000);
+      data::Store store = data::Store::open(db, data::Store::Mode::write_or_create);
+      std::atomic<bool> stop{false};
+      // Later at times: on one that has become busy such a time may be too short to begin.
+      const double longest = share * static_cast<double>(whole.count()) * (1 + 0.04 * stops);
+      const auto after = std::chrono::microseconds(static_cast<int>(random.unit() * longest));
+      std::jthread stopper([&] {
+        std::this_thread::sleep_for(after);
+        stop = true;
+      });
+      const StudyProgress progress =
+          simulate_study(p, store, participants::load_simulated_settings(""),
+                         {.numbers = first_numbers(3), .seed = 1, .jobs = 2}, stop, {});
+      done = progress.recorded == progress.expected;
+      interrupted += progress.recorded > 0 && !done;
+    }
+    EXPECT_EQ(csv_of(db), csv_of(folder_ / "whole.db"));
   }
-  EXPECT_GT(stops, 1) << "nothing was interrupted";
-  EXPECT_EQ(csv_of(db), csv_of(folder_ / "whole.db"));
 }
 
 void SimulatedStudy::expect_frozen(int version) const {
