@@ -20,7 +20,6 @@ std::size_t ticks_of(double seconds, double rate) {
 // Lets a duration equal to the limit pass despite rounding.
 constexpr double kMeasureRounding = 1e-9;
 
-using enum MeasureScale;
 using Values = std::vector<double>;
 
 /// Sets values by their names.
@@ -277,6 +276,7 @@ std::vector<Procedure> procedures(const std::vector<bool>& contact,
 }
 
 const std::array<MeasureDefinition, kMeasures>& measure_definitions() {
+  using enum MeasureScale;
   static constexpr std::array<MeasureDefinition, kMeasures> kAll = {{
       {"path_length", "m", log, "length of the tip's path"},
       {"contact_path", "m", log, "length of the tip's path in contact"},
