@@ -5,9 +5,11 @@
 #include <algorithm>
 #include <cerrno>
 #include <cstddef>
+#include <cstdio>
 #include <iostream>
 #include <string_view>
 
+#include "data/base/text.h"
 #include "runner/usage_error.h"
 
 namespace palpate::runner {
@@ -43,6 +45,8 @@ std::string given_or_asked(const std::string& given, const std::string& what) {
   if (!answer) throw UsageError("-: standard input must hold a " + what);
   return *answer;
 }
+
+void say(const std::string& text) { std::fprintf(stderr, "%s\n", printable_lines(text).c_str()); }
 
 std::string join_names(const std::vector<std::string>& names) {
   std::string words;

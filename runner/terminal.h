@@ -21,6 +21,9 @@ std::optional<std::string> ask(const std::string& question);
 /// command lines. \param what  "participant code". \throws UsageError if standard input is empty.
 std::string given_or_asked(const std::string& given, const std::string& what);
 
+/// Prints lines on standard error; control characters are shown, not sent.
+void say(const std::string& text);
+
 /// "P01", "P01 and P02", "P01, P02 and P03"
 std::string join_names(const std::vector<std::string>& names);
 

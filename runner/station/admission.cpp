@@ -171,8 +171,6 @@ void check_withdrawal(data::Store& store, const data::Participant& participant, 
 
 namespace fs = std::filesystem;
 
-void say(const std::string& text) { std::fprintf(stderr, "%s\n", printable_lines(text).c_str()); }
-
 /// The facts that the database holds.
 struct Known {
   std::vector<std::string> codes;          ///< in the order they came

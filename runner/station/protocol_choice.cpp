@@ -36,8 +36,6 @@ const char* to_string(ProtocolChoice choice) {
   return "";
 }
 
-void say(const std::string& text) { std::fprintf(stderr, "%s\n", printable_lines(text).c_str()); }
-
 std::string what_happened(const ChangedProtocol& changed,
                           const protocols::ProtocolDifference& difference) {
   const EarlierProtocol& earlier = changed.earlier;
