@@ -64,11 +64,13 @@ GroupAssignment read_groups(const nlohmann::json& protocol) {
     if (rule == to_string(one)) out.rule = one;
   }
   if (!out.any()) return out;
-  if (const auto block = groups->find("block");
-      block != groups->end() && block->is_number_integer())
-    out.block = std::max(1, block->get<int>());
-  if (const auto seed = protocol.find("seed"); seed != protocol.end() && seed->is_number_unsigned())
-    out.seed = *seed;
+  // Whole numbers, as the protocol's reader takes them: 14.0 is 14.
+  if (const auto block = groups->find("block"); block != groups->end() && block->is_number())
+    out.block = std::max(1, static_cast<int>(block->get<double>()));
+  if (const auto seed = protocol.find("seed"); seed != protocol.end() && seed->is_number()) {
+    out.seed = seed->is_number_integer() ? seed->get<std::uint64_t>()
+                                         : static_cast<std::uint64_t>(seed->get<double>());
+  }
   return out;
 }
 

@@ -1,9 +1,13 @@
 #include "protocols/groups.h"
 
+#include <algorithm>
 #include <array>
+#include <cctype>
 #include <cstddef>
 #include <nlohmann/json.hpp>
 #include <string>
+
+#include "data/base/json_text.h"
 
 namespace palpate::protocols {
 namespace {
@@ -17,7 +21,12 @@ constexpr NumberRange kBlock{1, 100};     // participants of each group
 constexpr std::array kUntouched = {"groups", "factors", "name", "version", "seed", "cues"};
 
 bool is_group_name(const std::string& text) {
-  return !text.empty() && text.size() <= kLongestName &&
+  std::string lower = text;
+  std::ranges::transform(lower, lower.begin(), [](unsigned char c) { return std::tolower(c); });
+  // Tables write a missing value, or a person in several groups, by these.
+  constexpr std::array kTaken = {"na", "nan", "null", "none", "mixed"};
+  if (std::ranges::find(kTaken, lower) != kTaken.end()) return false;
+  return !text.empty() && text.size() <= kLongestName && text.front() != '-' &&
          text.find_first_not_of(
              "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789-") ==
              std::string::npos;
@@ -31,8 +40,11 @@ void read_names(ObjectReader& section, GroupAssignment& groups) {
     const std::string pointer = child_pointer(section.pointer("names"), i);
     const std::string name = one.is_string() ? one.get<std::string>() : "";
     if (!is_group_name(name)) {
-      section.faults().add(pointer, "expected a name of 1 to " + std::to_string(kLongestName) +
-                                        " letters, digits and '-'" + found_text(one));
+      section.faults().add(pointer,
+                           "expected a name of 1 to " + std::to_string(kLongestName) +
+                               " letters, digits and '-', from a letter or digit on, and no "
+                               "word for missing" +
+                               found_text(one));
     } else if (groups.find(name) < groups.names.size()) {
       section.faults().add(pointer, "expected a unique name, found '" + name + "' again");
     }
@@ -81,6 +93,24 @@ std::vector<json> read_groups(ObjectReader& reader, Protocol& protocol) {
     read_patches(section, groups, patches);
   });
   return patches;
+}
+
+std::vector<std::pair<std::string, std::string>> texts_of_groups(const std::string& text) {
+  const json root = json_or_discarded(text);
+  const json::json_pointer names("/groups/names");
+  std::vector<std::pair<std::string, std::string>> out;
+  if (!root.is_object() || !root.contains("groups") || !root["groups"].is_object() ||
+      !root.contains(names) || !root[names].is_array())
+    return {{"", text}};
+  for (const json& name : root[names]) {
+    if (!name.is_string()) continue;
+    json patched = root;
+    const json::json_pointer patch = json::json_pointer("/groups/patch") / name.get<std::string>();
+    if (root.contains(patch)) patched.merge_patch(root[patch]);
+    patched.erase("groups");
+    out.emplace_back(name, patched.dump());
+  }
+  return out;
 }
 
 const Protocol& protocol_of(const Protocol& protocol, int participant_number) {

@@ -3,6 +3,8 @@
 // (data/base/group_assignment.h), and what differs for a group.
 
 #include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "protocols/json_document.h"
@@ -13,6 +15,10 @@ namespace palpate::protocols {
 /// Reads the key `groups` into protocol.groups. \return the merge patch (RFC 7396) of each group
 /// on the protocol; empty: there are no groups
 std::vector<nlohmann::json> read_groups(ObjectReader& reader, Protocol& protocol);
+
+/// The name of each group and the text of its protocol; without groups "" and the text itself. Not
+/// validated again.
+std::vector<std::pair<std::string, std::string>> texts_of_groups(const std::string& text);
 
 /// The protocol that a participant sees: that of their group.
 const Protocol& protocol_of(const Protocol& protocol, int participant_number);

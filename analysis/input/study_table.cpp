@@ -22,6 +22,7 @@
 #include "data/store/store.h"
 #include "data/store/task_text.h"
 #include "data/stored_protocol.h"
+#include "protocols/groups.h"
 #include "protocols/parse.h"
 
 namespace palpate::analysis {
@@ -239,7 +240,7 @@ void drop_missing_answers(std::vector<StudyTrial>& trials) {
 /// The procedures of a protocol, and its title if the trials are of it.
 void put_protocol(const std::string& sha256, const std::string& text, const std::string& path,
                   StudyTable& table) {
-  table.procedures[sha256] = protocols::procedures_of_blocks(text, path);
+  add_procedures(sha256, text, path, table);
   const bool used = std::ranges::any_of(table.protocols,
                                         [&](const auto& known) { return known.second == sha256; });
   if (used && table.title.empty()) table.title = data::read_stored_protocol(text).title;
@@ -280,19 +281,6 @@ bool is_of_tasks(const std::string& path, const std::vector<std::string>& wanted
   return !has_others;
 } catch (const std::runtime_error&) {
   return false;  // read_trials_csv says what is wrong
-}
-
-/// Puts the names of groups in the order of the protocols.
-void order_groups(const std::vector<ProtocolText>& protocols, GroupLabels& labels) {
-  GroupLabels ordered;
-  for (const ProtocolText& one : protocols) {
-    for (const std::string& name : data::read_stored_protocol(one.text).groups.names) {
-      if (std::ranges::find(ordered.names, name) == ordered.names.end())
-        ordered.names.push_back(name);
-    }
-  }
-  for (const auto& [participant, group] : labels.of) ordered.add(participant, labels.names[group]);
-  labels = std::move(ordered);
 }
 
 StudyTable read_tasks_csv(const std::string& path, const std::vector<std::string>& wanted,
@@ -347,9 +335,9 @@ StudyTable read_tasks_csv(const std::string& path, const std::vector<std::string
     StudyTrial& trial = table.trials.back();
     trial.simulated = simulated;
     if (!row.value("group").empty()) {
-      const std::string group(row.text("group"));
-      const std::string& known = table.group_labels.add(trial.participant, group);
-      if (known != group)
+      trial.group = row.text("group");
+      const std::string& known = table.group_labels.add(trial.participant, trial.group);
+      if (known != trial.group)
         row.add_fault("group", "expected one group for each participant; found " +
                                    printable(known) + " before");
     }
@@ -374,7 +362,12 @@ StudyTable read_tasks_csv(const std::string& path, const std::vector<std::string
                           (wanted.empty() ? "" : " of the protocol " + wanted.front())});
   if (!faults.empty()) throw protocols::InputError(std::move(faults));
   for (const ProtocolText& one : protocols) put_protocol(one.sha256, one.text, path, table);
-  order_groups(protocols, table.group_labels);
+  std::vector<std::string> groups;
+  for (const ProtocolText& one : protocols) {
+    for (const std::string& name : data::read_stored_protocol(one.text).groups.names)
+      note_once(name, groups);
+  }
+  label_groups(groups, table);
   if (numbered) order_trials(table.trials);
   drop_missing_answers(table.trials);
   warn_of_alike_names(table);
@@ -406,7 +399,6 @@ StudyTable read_tasks_store(data::Store& store, const std::string& protocol) {
   std::vector<std::string> names, observers;
   const data::TorqueNotes torque_notes(store);
   const data::ParticipantGroups groups(store);
-  table.group_labels.names = groups.names();
   TorqueCounts torque;
   store.for_each_trial([&](const data::StoredTrial& stored) {
     if (!is_protocol(protocol, stored.protocol_name, stored.protocol_sha256)) return;
@@ -421,9 +413,7 @@ StudyTable read_tasks_store(data::Store& store, const std::string& protocol) {
       table.trials.back().protocol_sha256 = stored.protocol_sha256;
       table.trials.back().participant_number = stored.participant.enrolled_number;
       table.trials.back().simulated = stored.participant.simulated;
-      if (const std::string group = groups.of(stored.participant, stored.protocol_sha256);
-          !group.empty())
-        table.group_labels.add(stored.participant.code, group);
+      table.trials.back().group = groups.of(stored.participant, stored.protocol_sha256);
       torque.add(stored.record.renderer, torque_notes.driven(stored));
       note_once(stored.protocol_name, names);
       note_once(stored.protocol_sha256, table.provenance.protocol_sha256);
@@ -431,9 +421,12 @@ StudyTable read_tasks_store(data::Store& store, const std::string& protocol) {
       note_once(stored.run.observer_sha256, observers);
     }
   });
+  std::vector<std::string> group_names;
   for (const data::ProtocolInfo& one : store.protocols()) {
-    if (is_protocol(protocol, one.name, one.sha256))
-      put_protocol(one.sha256, one.text, path, table);
+    if (!is_protocol(protocol, one.name, one.sha256)) continue;
+    put_protocol(one.sha256, one.text, path, table);
+    for (const std::string& name : data::read_stored_protocol(one.text).groups.names)
+      note_once(name, group_names);
   }
   table.people = data::participant_columns(store);
   std::set<std::string> shown;
@@ -448,6 +441,7 @@ StudyTable read_tasks_store(data::Store& store, const std::string& protocol) {
           "expected at least one completed trial that is not practice" +
               (protocol.empty() ? "" : " of the protocol " + printable(protocol))}});
   warn_of_alike_names(table);
+  label_groups(group_names, table);
   torque.warn(table.warnings);
   return table;
 }
@@ -475,6 +469,43 @@ const std::string& GroupLabels::add(const std::string& participant, const std::s
   auto at = std::ranges::find(names, group);
   if (at == names.end()) at = names.insert(names.end(), group);
   return names[of.emplace(participant, static_cast<std::size_t>(at - names.begin())).first->second];
+}
+
+std::string procedures_key(const std::string& protocol_sha256, const std::string& group) {
+  return group.empty() ? protocol_sha256 : protocol_sha256 + "/" + group;
+}
+
+void add_procedures(const std::string& sha256, const std::string& text, const std::string& path,
+                    StudyTable& table) {
+  for (const auto& [group, patched] : protocols::texts_of_groups(text))
+    table.procedures[procedures_key(sha256, group)] =
+        protocols::procedures_of_blocks(patched, path);
+}
+
+void label_groups(const std::vector<std::string>& names, StudyTable& table) {
+  GroupLabels& labels = table.group_labels;
+  const std::vector<std::string> came = std::exchange(labels, {}).names;
+  labels.names = names;
+  for (const std::string& name : came) note_once(name, labels.names);
+  Interner without;
+  for (const StudyTrial& trial : table.trials) {
+    if (trial.group.empty())
+      without.number(trial.participant);
+    else
+      labels.add(trial.participant, trial.group);
+  }
+  if (labels.of.empty()) {
+    labels.names.clear();
+    return;
+  }
+  Interner all;
+  for (const std::string& name : labels.names) all.number(name);
+  warn_of_alike("Groups", all.names(), table.warnings);
+  if (without.names().empty()) return;
+  std::string text;
+  for (const std::string& name : without.names()) text += (text.empty() ? "" : ", ") + name;
+  table.warnings.push_back("Without a group, and left out of the comparison of groups: " + text +
+                           ".");
 }
 
 StudyTrial study_trial_of(const std::string& participant, const data::TrialRecord& record) {
@@ -505,7 +536,15 @@ StudyTrial study_trial_of(const std::string& participant, const data::TrialRecor
 
 StudyTable read_study_csv(const std::string& path, const std::vector<std::string>& wanted,
                           const std::vector<ProtocolText>& protocols) {
-  if (!is_of_tasks(path, wanted)) return of_shapes(read_trials_csv(path, wanted), path, protocols);
+  if (!is_of_tasks(path, wanted)) {
+    StudyTable table = of_shapes(read_trials_csv(path, wanted), path, protocols);
+    CsvReader reader(path);
+    if (read_header(reader).contains("group"))
+      table.times->warnings.emplace_back(
+          "The column group is not used without a column task; add one, with identify in each "
+          "row, to compare the groups.");
+    return table;
+  }
   return read_tasks_csv(path, wanted, protocols);
 }
 

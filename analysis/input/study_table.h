@@ -40,10 +40,21 @@ struct StudyTable {
   std::vector<data::ParticipantColumn> people;
   /// Their protocols: name and SHA-256, each once.
   std::vector<std::pair<std::string, std::string>> protocols;
-  /// The procedures, by SHA-256 of the protocol and name of the block; of a table only if its
-  /// protocols were given.
+  /// The procedures, by procedures_key and name of the block; of a table only if its protocols were
+  /// given.
   std::map<std::string, std::map<std::string, protocols::BlockProcedures>> procedures;
 };
+
+/// The protocol of a group, by its SHA-256 and the group's name; "": without groups.
+std::string procedures_key(const std::string& protocol_sha256, const std::string& group);
+
+/// Adds the procedures of a protocol's text, for each of its groups.
+void add_procedures(const std::string& sha256, const std::string& text, const std::string& path,
+                    StudyTable& table);
+
+/// Sets the groups of the participants from the trials, and what there is to say of them.
+/// \param names  the groups in the protocol's order; others follow as they come
+void label_groups(const std::vector<std::string>& names, StudyTable& table);
 
 /// Reads an export of trials. Those of tasks need participant_id, task, renderer and shape; level,
 /// standard_level, success, number, confidence, ... are optional. Those of a study of shapes: see

@@ -13,6 +13,7 @@ namespace palpate::analysis {
 struct StudyTrial {
   std::string participant, task = "identify", block_name, renderer, shape, response;
   std::string track;
+  std::string group;  ///< of the participant; "": none, or unknown
   std::optional<double> level, standard_level, number, confidence;
   bool catch_trial = false, success = false, answered = false;
   std::optional<bool> correct;  ///< none: no answer is right or wrong

@@ -51,7 +51,7 @@ GroupMarginal marginal(const std::vector<double>& values) {
   const auto n = static_cast<double>(values.size());
   out.se = *sd / std::sqrt(n);
   const double half = *out.se * quantile_975(n - 1);
-  out.ci95 = Interval{*out.mean - half, *out.mean + half};
+  if (std::isfinite(half)) out.ci95 = Interval{*out.mean - half, *out.mean + half};
   return out;
 }
 
@@ -82,6 +82,10 @@ GroupContrast welch(const std::vector<double>& reference, const std::vector<doub
   const double va = *a * *a / m, vb = *b * *b / n;
   if (std::sqrt(va + vb) <= kNoVariance * std::max(1.0, std::fabs(mean(reference)))) {
     out.undefined = "all participants of a group are equal (no variance)";
+    return out;
+  }
+  if (!std::isfinite(va * va + vb * vb)) {
+    out.undefined = "numbers too large";
     return out;
   }
   out.se = std::sqrt(va + vb);

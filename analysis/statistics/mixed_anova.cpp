@@ -79,6 +79,10 @@ GroupEffect effect_of(std::string name, const GroupScores& scores, const VectorX
     out.undefined = "the effect is equal in all participants of a group (no variance)";
     return out;
   }
+  if (!std::isfinite(ss) || !std::isfinite(error) || !std::isfinite(all_error)) {
+    out.undefined = "numbers too large";
+    return out;
+  }
   out.f = ss / *out.num_df / error;
   out.p = f_upper_tail(*out.f, *out.num_df, error_df);
   out.generalized_eta_squared = ss / (ss + all_error);

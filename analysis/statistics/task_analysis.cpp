@@ -710,7 +710,7 @@ InformationTransfer information_transfer(const CountTable& counts) {
 }
 
 const protocols::BlockProcedures* block_of(const StudyTrial& trial, const StudyTable& table) {
-  const auto protocol = table.procedures.find(trial.protocol_sha256);
+  const auto protocol = table.procedures.find(procedures_key(trial.protocol_sha256, trial.group));
   if (protocol == table.procedures.end()) return nullptr;
   const auto block = protocol->second.find(trial.block_name);
   return block == protocol->second.end() ? nullptr : &block->second;

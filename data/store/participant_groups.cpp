@@ -9,18 +9,11 @@ namespace palpate::data {
 ParticipantGroups::ParticipantGroups(Store& store) {
   for (const ProtocolInfo& protocol : store.protocols()) {
     GroupAssignment groups = read_stored_protocol(protocol.text).groups;
+    for (const std::string& name : groups.names) {
+      if (std::ranges::find(names_, name) == names_.end()) names_.push_back(name);
+    }
     if (groups.any()) by_protocol_.emplace(protocol.sha256, std::move(groups));
   }
-}
-
-std::vector<std::string> ParticipantGroups::names() const {
-  std::vector<std::string> out;
-  for (const auto& [sha256, groups] : by_protocol_) {
-    for (const std::string& name : groups.names) {
-      if (std::ranges::find(out, name) == out.end()) out.push_back(name);
-    }
-  }
-  return out;
 }
 
 std::string ParticipantGroups::of(const Participant& participant,

@@ -18,12 +18,13 @@ class ParticipantGroups {
   /// Whether any protocol of the database has groups.
   bool any() const { return !by_protocol_.empty(); }
   /// Names of all groups, in the order of protocols.
-  std::vector<std::string> names() const;
+  const std::vector<std::string>& names() const { return names_; }
   /// The participant's; "": the protocol has no groups. \param protocol_sha256  of the participant
   std::string of(const Participant& participant, const std::string& protocol_sha256) const;
 
  private:
   std::map<std::string, GroupAssignment> by_protocol_;  // by SHA-256
+  std::vector<std::string> names_;
 };
 
 }  // namespace palpate::data

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <set>
 #include <system_error>
 
@@ -151,6 +152,34 @@ bool is_built_in_answer(const TaskBlock& block, const TaskAnswer& answer) {
   return answer.label == answer.name && answer.name.size() > 1;  // 1, 2 and 3 fit any language
 }
 
+/// Every text of the protocol needs a valid translation.
+void check_translations(const Protocol& protocol, const json& given, FaultList& faults) {
+  Protocol copy = protocol;
+  std::set<std::pair<std::string, std::string>> labels;
+  for (const TextPlace& place : TextPlaces(copy).take()) {
+    const auto value = given.find(place.key);
+    if (value == given.end()) {
+      faults.add(child_pointer("", place.key),
+                 "expected the translation of '" + place.text->substr(0, 60) + "': it is missing");
+      continue;
+    }
+    check_translation(place, *value, faults);
+    if (place.label && value->is_string() &&
+        !labels.emplace(group_of(place.key), value->get<std::string>()).second) {
+      faults.add(child_pointer("", place.key),
+                 "expected a unique label, found '" + value->get<std::string>() + "' again");
+    }
+  }
+}
+
+void put_translations(Protocol& protocol, const std::string& language, const std::string& text,
+                      const json& given) {
+  for (const TextPlace& place : TextPlaces(protocol).take())
+    *place.text = given[place.key].get<std::string>();
+  protocol.language = language;
+  protocol.translation = text;
+}
+
 }  // namespace
 
 std::vector<std::pair<std::string, std::string>> texts_of(const Protocol& protocol) {
@@ -163,6 +192,12 @@ std::vector<std::pair<std::string, std::string>> texts_of(const Protocol& protoc
 std::string texts_json(const Protocol& protocol) {
   nlohmann::ordered_json all;
   for (const auto& [key, text] : texts_of(protocol)) all[key] = text;
+  // A group's own texts; where it has another one, the translation is for both.
+  for (const auto& group : protocol.group_protocols) {
+    for (const auto& [key, text] : texts_of(*group)) {
+      if (!all.contains(key)) all[key] = text;
+    }
+  }
   return all.dump(1, ' ', false, json::error_handler_t::replace) + "\n";
 }
 
@@ -199,32 +234,24 @@ void translate(Protocol& protocol, const std::string& language, const std::strin
   const json given = read_json(text, faults);
   if (!given.is_object()) faults.add("", "expected an object of texts" + found_text(given));
   faults.throw_if_any();
-  const std::vector<TextPlace> places = TextPlaces(protocol).take();
+  check_translations(protocol, given, faults);
   std::set<std::string> known;
-  std::set<std::pair<std::string, std::string>> labels;
-  for (const TextPlace& place : places) {
-    known.insert(place.key);
-    const auto value = given.find(place.key);
-    if (value == given.end()) {
-      faults.add(child_pointer("", place.key),
-                 "expected the translation of '" + place.text->substr(0, 60) + "': it is missing");
-      continue;
-    }
-    check_translation(place, *value, faults);
-    if (place.label && value->is_string() &&
-        !labels.emplace(group_of(place.key), value->get<std::string>()).second) {
-      faults.add(child_pointer("", place.key),
-                 "expected a unique label, found '" + value->get<std::string>() + "' again");
-    }
+  for (const auto& [key, words] : texts_of(protocol)) known.insert(key);
+  for (const auto& group : protocol.group_protocols) {
+    if (faults.empty()) check_translations(*group, given, faults);
+    for (const auto& [key, words] : texts_of(*group)) known.insert(key);
   }
   for (const auto& [key, value] : given.items()) {
     if (!known.contains(key) && key != "$schema")
       faults.add(child_pointer("", key), "expected no such key: the protocol has no text there");
   }
   faults.throw_if_any();
-  for (const TextPlace& place : places) *place.text = given[place.key].get<std::string>();
-  protocol.language = language;
-  protocol.translation = text;
+  put_translations(protocol, language, text, given);
+  for (auto& group : protocol.group_protocols) {
+    auto translated = std::make_shared<Protocol>(*group);
+    put_translations(*translated, language, text, given);
+    group = std::move(translated);
+  }
 }
 
 void translate(Protocol& protocol, const std::string& protocol_path, const std::string& language) {

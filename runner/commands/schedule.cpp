@@ -78,6 +78,8 @@ int number_in(const std::string& name, const GroupAssignment& groups, int row) {
   const std::size_t group = groups.find(name);
   if (group == groups.names.size())
     throw UsageError("--group: expected " + join_names(groups.names) + ", found '" + name + "'");
+  constexpr int kMost = 1'000'000;
+  if (row > kMost) throw UsageError("--group: --participant must be at most 1000000");
   return groups.number(group, row);
 }
 

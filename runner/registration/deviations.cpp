@@ -365,7 +365,9 @@ CheckPoint of_trials(const Registration& registered, const StudyData& study) {
   };
   const std::string registered_words =
       adaptive ? "trials up to the end of every procedure"
-               : "the registered " + counted(planned_of(1), "trial", "trials");
+      : registered.protocol.groups.any()
+          ? std::string("the trials that were registered for the group")
+          : "the registered " + counted(planned_of(1), "trial", "trials");
   CheckPoint out{"trials", "Number of trials", Finding::as_registered,
                  "Every participant has " + registered_words + "."};
   for (const StudyParticipant& one : study.participants) {
@@ -382,8 +384,10 @@ CheckPoint of_trials(const Registration& registered, const StudyData& study) {
   out.finding = Finding::deviation;
   out.sentence = counted(out.evidence.size(), "participant has", "participants have") +
                  (adaptive ? " not all trials."
-                           : " another number of trials than the registered " +
-                                 std::to_string(planned_of(1)) + ".");
+                  : registered.protocol.groups.any()
+                      ? std::string(" another number of trials than was registered for the group.")
+                      : " another number of trials than the registered " +
+                            std::to_string(planned_of(1)) + ".");
   cut(out.evidence);
   return out;
 }

@@ -429,8 +429,8 @@ std::string PlannedTasks::analyzed(std::size_t study, bool with_effect) const {
   analysis::StudyTable table;
   table.simulated = true;
   table.protocols = {{made_.protocol.name, made_.protocol.sha256}};
-  table.procedures[made_.protocol.sha256] =
-      protocols::procedures_of_blocks(made_.protocol.source_text, "protocol.json");
+  analysis::add_procedures(made_.protocol.sha256, made_.protocol.source_text, "protocol.json",
+                           table);
   // No figure with a name depends on simulated goodness of fit, which takes most of the time.
   session::simulate_in_memory(
       protocol_, settings_, static_cast<int>(made_.participants), made_.seed + study, {},
@@ -440,9 +440,11 @@ std::string PlannedTasks::analyzed(std::size_t study, bool with_effect) const {
             analysis::study_trial_of(session::simulated_code(number), record));
         trial.protocol_sha256 = made_.protocol.sha256;
         trial.participant_number = number;
+        trial.group = made_.protocol.groups.name(number);
         trial.simulated = true;
       },
       judgement(study, with_effect));
+  analysis::label_groups(made_.protocol.groups.names, table);
   return analyzed(std::move(table), 0);
 }
 

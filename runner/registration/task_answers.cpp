@@ -7,6 +7,7 @@
 #include "analysis/report/plan_report.h"
 #include "analysis/statistics/paired.h"
 #include "analysis/text.h"
+#include "protocols/groups.h"
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
 #include "runner/registration/answers.h"
@@ -195,6 +196,14 @@ class TaskAnswers final : public StudyAnswers {
   std::vector<Paragraph> sample_size() const override {
     const std::size_t each = study::planned_trials(protocol_), people = made_.participants;
     const bool about = study::has_adaptive_blocks(protocol_);
+    if (protocol_.groups.any()) {
+      std::size_t all = 0;
+      for (std::size_t n = 1; n <= people; ++n)
+        all += study::planned_trials(protocols::protocol_of(protocol_, static_cast<int>(n)));
+      return {text(counted(people, "participant", "participants") + " with " +
+                   (about ? "about " : "") + std::to_string(all) +
+                   " trials in all that are analysed; each has those of the own group.")};
+    }
     return {text(counted(people, "participant", "participants") + " with " +
                  (about ? "about " : "") + std::to_string(each) +
                  " trials each that are analysed, " + (about ? "about " : "") +

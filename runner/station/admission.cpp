@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
@@ -180,6 +181,7 @@ struct Known {
   std::optional<int> number;        ///< for a new participant, if texts changed
   std::optional<std::int64_t> newest_ns;
   GroupFacts groups;
+  std::map<std::string, int> numbers;  ///< of the code, by the protocol's SHA-256
 };
 
 /// Other texts, the same trials: one counterbalancing, so its numbers continue.
@@ -217,16 +219,14 @@ bool has_completed(data::Store& store, const protocols::Protocol& protocol,
   return true;
 }
 
-GroupFacts facts_of_groups(data::Store& store, const protocols::Protocol& protocol,
-                           const std::string& code) {
+GroupFacts facts_of_groups(data::Store& store, const protocols::Protocol& protocol) {
   GroupFacts facts;
   facts.completed.resize(protocol.groups.names.size());
   for (const data::ProtocolInfo& info : store.protocols()) {
-    if (info.name != protocol.name) continue;
-    const bool same = protocols::difference(info.text, protocol.source_text).only_texts();
+    if (info.name != protocol.name ||
+        !protocols::difference(info.text, protocol.source_text).only_texts())
+      continue;
     for (const data::Participant& one : store.participants(info.sha256)) {
-      if (one.code == code) facts.enrolled = one.enrolled_number;
-      if (!same) continue;
       facts.taken.insert(one.number);
       if (has_completed(store, protocol, one))
         ++facts.completed[protocol.groups.group(one.enrolled_number)];
@@ -253,7 +253,12 @@ Known look_into(const RunSettings& settings, const protocols::Protocol& protocol
   for (const data::Participant& one : store.participants(protocol.sha256))
     known.enrolled = known.enrolled || one.code == code;
   known.newest_ns = store.latest_recorded_time();
-  if (protocol.groups.any()) known.groups = facts_of_groups(store, protocol, code);
+  if (protocol.groups.any()) known.groups = facts_of_groups(store, protocol);
+  for (const data::ProtocolInfo& info : store.protocols()) {
+    for (const data::Participant& one : store.participants(info.sha256)) {
+      if (one.code == code) known.numbers[info.sha256] = one.enrolled_number;
+    }
+  }
   if (known.enrolled) return known;
   known.earlier = earlier_protocol(store, protocol, code);
   if (known.earlier) return known;
@@ -340,6 +345,9 @@ void join_group(const RunSettings& settings, const Known& known, Admission& admi
   GroupFacts facts = known.groups;
   const GroupAssignment& groups = admission.protocol.groups;
   facts.completed.resize(groups.names.size());
+  if (const auto number = known.numbers.find(admission.enrolled.sha256);
+      number != known.numbers.end())
+    facts.enrolled = number->second;
   if (const std::optional<int> number = number_in_group(settings, admission.protocol, facts))
     admission.number = number;
   if (!groups.any()) return;
@@ -358,8 +366,9 @@ void join_group(const RunSettings& settings, const Known& known, Admission& admi
                                   .dump());
   }
   say("group " + groups.name(number));
-  const protocols::Protocol own = protocols::protocol_of(admission.protocol, number);
-  admission.protocol = own;
+  admission.group = groups.group(number);
+  admission.of_all = std::move(admission.protocol);
+  admission.protocol = protocols::protocol_of(admission.of_all, number);
 }
 
 std::string ask_new_code() {

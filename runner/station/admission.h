@@ -2,6 +2,7 @@
 // The admission to a session, before a device is opened: the participant and the protocol, with
 // questions about doubtful points.
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -48,6 +49,8 @@ struct Admission {
   std::optional<int> number;     ///< to be assigned; none: the next unused one
   data::ProtocolInfo enrolled;   ///< the protocol that the participant is, or will be, enrolled in
   protocols::Protocol protocol;  ///< to be shown: the group's own; else the same but for texts
+  std::size_t group = 0;         ///< index, where the protocol has groups
+  protocols::Protocol of_all;    ///< the same for all groups, of which `protocol` is one
   data::ProtocolInfo shown;      ///< that protocol, with the files of all groups
   std::vector<std::string> warnings;  ///< for the experimenter, also on the console
   std::vector<std::string> notes;     ///< JSON, for the record

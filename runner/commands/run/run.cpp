@@ -258,7 +258,14 @@ void translate_texts(const station::RunSettings& settings, station::Admission& a
   if (has_joystick(settings, protocol) != !protocol.responses.joystick.empty())
     admission.warnings.emplace_back("a gamepad or pedal is looked at in a window only");
   if (settings.language.empty()) return;
-  protocols::translate(protocol, settings.protocol, settings.language);
+  if (protocol.groups.any()) {
+    // A translation has the texts of all groups.
+    const std::size_t group = admission.group;
+    protocols::translate(admission.of_all, settings.protocol, settings.language);
+    protocol = *admission.of_all.group_protocols[group];
+  } else {
+    protocols::translate(protocol, settings.protocol, settings.language);
+  }
   admission.notes.push_back(nlohmann::ordered_json{
       {"language", settings.language},
       {"texts_sha256", checksum_hex(protocol.translation)},

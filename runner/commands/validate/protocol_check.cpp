@@ -211,10 +211,13 @@ Duration duration_of(const protocols::Protocol& protocol) {
 
 Json faults_json(const std::string& file, const std::vector<protocols::Fault>& faults) {
   Json out{{"version", 1}, {"file", file}, {"faults", Json::array()}};
-  for (const protocols::Fault& fault : faults)
-    out["faults"].push_back({{"pointer", fault.location},
-                             {"line", fault.line > 0 ? Json(fault.line) : Json(nullptr)},
-                             {"text", fault.expected}});
+  for (const protocols::Fault& fault : faults) {
+    Json& one = out["faults"].emplace_back();
+    one = {{"pointer", fault.location},
+           {"line", fault.line > 0 ? Json(fault.line) : Json(nullptr)},
+           {"text", fault.expected}};
+    if (fault.file != file) one["file"] = fault.file;
+  }
   return out;
 }
 
@@ -240,7 +243,19 @@ Json protocol_json(const std::string& file, const protocols::Protocol& protocol,
     const protocols::Protocol& group = *protocol.group_protocols[i];
     add(group, StimulusLibrary(group), protocol.groups.names[i]);
   }
-  const Duration duration = duration_of(protocol);
+  Duration duration = duration_of(protocol);
+  for (std::size_t i = 0; i < protocol.group_protocols.size(); ++i) {
+    const protocols::Protocol& group = *protocol.group_protocols[i];
+    const Duration own = duration_of(group);
+    out["groups"].push_back({{"name", protocol.groups.names[i]},
+                             {"summary", summary_json(group)},
+                             {"duration_s", own.usual},
+                             {"longest_s", own.longest}});
+    if (i == 0) duration = own;
+    duration.usual = std::max(duration.usual, own.usual);
+    duration.longest = std::max(duration.longest, own.longest);
+  }
+  // Of groups the longest.
   out["duration_s"] = duration.usual;
   out["longest_s"] = duration.longest;
   return out;

@@ -321,6 +321,7 @@ void print_protocol(const protocols::Protocol& protocol, SceneBuilder builder,
   for (std::size_t i = 0; i < protocol.group_protocols.size(); ++i) {
     const protocols::Protocol& group = *protocol.group_protocols[i];
     out << "group " << protocol.groups.names[i] << "\n";
+    print_task_summary(group, out);
     print_fitness(group, StimulusLibrary(group), measured, out);
   }
 }
@@ -352,6 +353,13 @@ void validate_file(const ValidateRequest& request, std::ostream& out) {
   for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
     check_meshes(protocol.stimuli[i].object, "/stimuli/" + std::to_string(i), file, builder,
                  faults);
+  }
+  for (std::size_t g = 0; g < protocol.group_protocols.size(); ++g) {
+    const std::vector<protocols::StimulusSpec>& stimuli = protocol.group_protocols[g]->stimuli;
+    for (std::size_t i = 0; i < stimuli.size() && faults.empty(); ++i)
+      check_meshes(stimuli[i].object,
+                   "/groups/patch/" + protocol.groups.names[g] + "/stimuli/" + std::to_string(i),
+                   file, builder, faults);
   }
   if (!faults.empty()) throw protocols::InputError(faults);
   if (!request.json) return print_protocol(protocol, std::move(builder), request.measured, out);

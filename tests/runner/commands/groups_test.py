@@ -151,6 +151,83 @@ class Groups(command_case.CommandCase):
                                    "A,young,rate,ray,plate,3,1\nA,old,rate,ray,plate,3,2\n")
         self.assertIn("line 3", self.palpate("analyze", "--csv", table, status=2).stderr)
 
+    def test_whole_numbers_of_any_form_give_the_group_that_was_shown(self):
+        other = {"blocks": [SMALL["blocks"][0] | {"name": "c"}]}
+        for changes in ({"seed": 14.0}, {"seed": 14}, {"seed": 3, "block": 3.0}):
+            groups = {"names": ["young", "old"], "assign": "blocked", "patch": {"old": other}}
+            groups |= {key: value for key, value in changes.items() if key == "block"}
+            protocol = self.file("p.json", SMALL | {"seed": changes["seed"], "groups": groups})
+            _, rows = self.exported(self.simulated(protocol, "--participants", 8, name=f"{changes}.db"))
+            self.assertEqual({(row["group"], row["block_name"]) for row in rows}, {("young", "a"), ("young", "b"), ("old", "c")})
+
+    def test_each_group_is_analysed_by_its_own_protocol(self):
+        stairs = {"name": "s", "task": "compare", "stimuli": ["plate"], "standard": "plate", "level": {"path": "/stiffness_n_per_m"},
+                  "procedure": {"kind": "staircase", "start": 500, "min": 310, "max": 600, "steps": 50, "down": 2, "stop": {"trials": 30}}}
+        slower = stairs | {"procedure": stairs["procedure"] | {"down": 3}}
+        protocol = self.file("p.json", SMALL | {"blocks": [stairs], "groups": {"names": ["young", "old"], "patch": {"old": {"blocks": [slower]}}}})
+        db = self.simulated(protocol, "--participants", 2)
+        found = self.analyzed("--db", db)
+        targets = {one["participant_id"]: one["tracks"][0]["procedure"]["target"] for one in found["cells"][0]["participants"]
+                   if one["tracks"]}
+        self.assertAlmostEqual(targets["S001"], 0.5 ** (1 / 2), places=3)
+        self.assertAlmostEqual(targets["S002"], 0.5 ** (1 / 3), places=3)
+
+    def test_groups_of_another_protocol_are_not_compared(self):
+        db = self.simulated(self.grouped(), "--groups", "young=3,old=3")
+        self.palpate("simulate", self.file("q.json", SMALL | {"name": "other", "groups": {"names": ["red", "blue"]}}), "--db", db,
+                     "--participants", 4)
+        self.palpate("simulate", self.file("r.json", {key: value for key, value in SMALL.items() if key != "groups"} | {"name": "none"}),
+                     "--db", db, "--participants", 4)
+        self.assertEqual(self.analyzed("--db", db, "--protocol", "small")["design"]["groups"], ["young", "old"])
+        self.assertEqual(self.analyzed("--db", db, "--protocol", "other")["design"]["groups"], ["red", "blue"])
+        self.assertNotIn("design", self.analyzed("--db", db, "--protocol", "none"))
+
+    def test_a_participant_resumes_in_the_group_after_groups_were_removed(self):
+        protocol = self.grouped()
+        db = self.dir / "live.db"
+        self.palpate("simulate", protocol, "--db", db, "--groups", "young=1,old=1")
+        self.file("p.json", {key: value for key, value in SMALL.items() if key != "groups"})
+        said = self.run_live(protocol, "S002").stderr
+        self.assertNotIn("expected --group", said)
+        self.assertNotIn("group young", said)
+
+    def test_one_translation_is_for_all_groups(self):
+        patch = {"texts": {"instructions": "For old people."}, "blocks": [block | {"question": "HOW?"} for block in SMALL["blocks"]]}
+        protocol = self.grouped(patch={"old": patch})
+        texts = json.loads(self.palpate("validate", protocol, "--texts").stdout)
+        self.assertEqual((texts["texts.instructions"], texts["blocks.a.question"]), ("For old people.", "HOW?"))
+        self.file("p.texts.de.json", {key: value + " (de)" for key, value in texts.items()})
+        self.palpate("validate", protocol, "--language", "de")
+        done = self.run_live(protocol, "P01", "--group", "old", "--language", "de")
+        self.assertNotIn("expected", done.stderr)
+        del texts["blocks.a.question"]
+        self.file("p.texts.de.json", texts)
+        self.assertIn("blocks.a.question", self.palpate("validate", protocol, "--language", "de", status=2).stderr)
+
+    def test_validate_speaks_of_each_group(self):
+        more = [block | {"procedure": block["procedure"] | {"repetitions": 50}} for block in SMALL["blocks"]]
+        found = json.loads(self.palpate("validate", self.grouped(patch={"old": {"blocks": more}}), "--json").stdout)
+        self.assertEqual([(one["name"], one["summary"]["trials"]) for one in found["groups"]], [("young", 12), ("old", 600)])
+        self.assertEqual(found["duration_s"], found["groups"][1]["duration_s"])
+        self.assertEqual({one["group"] for one in found["devices"]}, {"young", "old"})
+
+    def test_tables_say_what_is_left_out(self):
+        table = self.file("t.csv", "participant_id,group,task,renderer,shape,response\n" + "".join(
+            f"{who},{group},rate,ray,plate,{i}\n" for i, (who, group) in enumerate(
+                (("Z", "young"), ("Y", "young"), ("A", "old"), ("B", "old"), ("C", ""), ("D", "Old")))))
+        found = self.analyzed("--csv", table)
+        self.assertEqual(found["design"]["groups"], ["young", "old", "Old"])
+        self.assertTrue(any("look alike" in text or "alike" in text for text in found["warnings"]), found["warnings"])
+        self.assertTrue(any(text.startswith("Without a group") and text.endswith(": C.") for text in found["warnings"]))
+        huge = self.file("huge.csv", "participant_id,group,task,renderer,shape,response\n" + "".join(
+            f"{who},{group},rate,ray,plate,{i}e300\n" for i, (who, group) in enumerate(
+                (("Z", "young"), ("Y", "young"), ("A", "old"), ("B", "old")))))
+        self.analyzed("--csv", huge)
+
+    def test_names_that_read_as_missing_are_refused(self):
+        for name in ("NA", "nan", "null", "mixed", "-x"):
+            self.assertIn("/groups/names/1", self.palpate("validate", self.grouped(names=["young", name], patch={}), status=2).stderr)
+
     def test_the_example_is_of_use(self):
         db = self.dir / "two.db"
         self.palpate("simulate", PROTOCOLS / "stiffness-two-groups.json", "--db", db, "--groups", "young=3,older=3")
