@@ -4,7 +4,7 @@ set -euo pipefail
 
 build=(g++ cmake ninja-build libboost-dev libboost-program-options-dev libeigen3-dev libglm-dev libsqlite3-dev
   libsqlitecpp-dev libusb-1.0-0-dev nettle-dev nlohmann-json3-dev pkg-config pybind11-dev python3-dev python3-numpy
-  libexpat1-dev libzip-dev libzstd-dev zlib1g-dev
+  libdeflate-dev libexpat1-dev libzip-dev libzstd-dev zlib1g-dev
   fonts-noto-core libasound2-dev libegl-dev libepoxy-dev libfontconfig-dev libglfw3-dev libimgui-dev libpango1.0-dev
   libpng-dev libstb-dev libwebp-dev libx11-dev libxrandr-dev)
 package=(dpkg-dev file help2man)  # `cmake --install` and cpack

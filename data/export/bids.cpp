@@ -2,7 +2,10 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <deque>
+#include <future>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <regex>
@@ -239,6 +242,25 @@ nlohmann::ordered_json MotionEvents::description(const ProtocolFacts& facts) {
 /// run.
 class BidsRecording {
  public:
+  struct File {
+    /// \param jobs  threads that compress; 0: not compressed
+    File(const std::string& path, int jobs) : sink(path) {
+      if (jobs > 0) gzip.emplace(sink, jobs);
+    }
+    void close() {
+      if (gzip) gzip->finish();
+      sink.close(false);
+    }
+    void write(const std::string& row) {
+      if (gzip)
+        gzip->write(row);
+      else
+        sink.write(row);
+    }
+    FileSink sink;
+    std::optional<GzipSink> gzip;
+  };
+
   /// Starts with this trial, which need not have samples. \param study of the protocol
   BidsRecording(const StoredTrial& first, const StudyLabel& study, const ExportSettings& settings);
 
@@ -248,8 +270,8 @@ class BidsRecording {
   /// \param path of the file, which is created with the first samples
   /// \throws StoreRefused: the samples are damaged.
   void add(const StoredTrial& trial, const std::string& path);
-  /// Closes the file. \return false: no trial had samples, so there is no file.
-  bool finish();
+  /// \return the file, to be closed; null: no trial had samples
+  std::unique_ptr<File> finish();
   /// After finish(): the JSON beside a physiological recording.
   nlohmann::ordered_json physio_sidecar() const;
   /// After finish(): the JSON beside a motion recording.
@@ -263,19 +285,6 @@ class BidsRecording {
   std::int64_t first_row_ns() const;
 
  private:
-  struct File {
-    File(const std::string& path, bool zipped) : sink(path) {
-      if (zipped) gzip.emplace(sink);
-    }
-    void write(const std::string& row) {
-      if (gzip)
-        gzip->write(row);
-      else
-        sink.write(row);
-    }
-    FileSink sink;
-    std::optional<GzipSink> gzip;
-  };
   std::optional<std::int64_t> slot_of(std::int64_t unix_ns) const;
 
   const StudyLabel& study_;
@@ -286,7 +295,7 @@ class BidsRecording {
   const std::int64_t begin_ns_;                // since 1970
   std::int64_t free_ = 0;                      // the first slot after all trials so far
   std::int64_t first_row_ = 0, next_row_ = 0;  // slots
-  std::optional<File> file_;
+  std::unique_ptr<File> file_;
   nlohmann::ordered_json trials_ = nlohmann::ordered_json::array();
   MotionEvents events_;
 };
@@ -395,7 +404,7 @@ void BidsRecording::add(const StoredTrial& trial, const std::string& path) {
   for (const SampleRecord& sample : record.samples) {
     const std::int64_t slot = onset + slots.next();
     if (!file_) {
-      file_.emplace(path, !settings_.motion);
+      file_ = std::make_unique<File>(path, settings_.motion ? 0 : settings_.jobs);
       first_row_ = next_row_ = slot;
     }
     if (&sample == &record.samples.front()) first = slot;
@@ -421,12 +430,7 @@ void BidsRecording::add(const StoredTrial& trial, const std::string& path) {
   if (settings_.motion) events_.add(trial, onset);
 }
 
-bool BidsRecording::finish() {
-  if (!file_) return false;
-  if (file_->gzip) file_->gzip->finish();
-  file_->sink.close(false);
-  return true;
-}
+std::unique_ptr<BidsRecording::File> BidsRecording::finish() { return std::move(file_); }
 
 nlohmann::ordered_json BidsRecording::physio_sidecar() const {
   nlohmann::ordered_json json{
@@ -603,6 +607,8 @@ class BidsWriter : public DatasetWriter {
   void note_clock(Json& json) const;
   std::string recording_name() const;
   void write_recording();
+  void close(std::unique_ptr<BidsRecording::File> file);
+  void wait_for_one();
   void end_session();
   void describe_derivatives(bool simulated);
   void describe_participants();
@@ -621,6 +627,7 @@ class BidsWriter : public DatasetWriter {
   std::map<std::string, std::string> scans_;
   std::optional<DerivedTable> derived_;  // of the session
   DelimitedRow row_{DelimitedFormat::tsv};
+  std::deque<std::future<void>> closing_;  // files under way
 };
 
 /// "sub-S001/ses-1/KIND/sub-S001_ses-1": begin of the names of a session's files.
@@ -701,9 +708,28 @@ void BidsWriter::end_table() {
     write_table();
     write_sidecar();
   }
-  if (recording_ && recording_->finish()) write_recording();
+  std::unique_ptr<BidsRecording::File> file;
+  if (recording_) file = recording_->finish();
+  if (file) write_recording();
+  if (file) close(std::move(file));
   recording_.reset();
   table_ = {};
+}
+
+/// The next trials are written while the rest of this file is compressed.
+void BidsWriter::close(std::unique_ptr<BidsRecording::File> file) {
+  if (settings_.jobs == 1) {
+    file->close();
+    return;
+  }
+  if (closing_.size() == static_cast<std::size_t>(settings_.jobs)) wait_for_one();
+  closing_.push_back(std::async(std::launch::async, [file = std::move(file)] { file->close(); }));
+}
+
+void BidsWriter::wait_for_one() {
+  std::future<void> first = std::move(closing_.front());
+  closing_.pop_front();
+  first.get();
 }
 
 void BidsWriter::note_clock(Json& json) const {
@@ -852,6 +878,7 @@ void BidsWriter::describe_derivatives(bool simulated) {
 
 void BidsWriter::describe_dataset(bool simulated) {
   end_session();
+  while (!closing_.empty()) wait_for_one();
   for (const auto& [stem, rows] : scans_) write(stem + "_scans.tsv", "filename\tacq_time\n" + rows);
   describe_derivatives(simulated);
   describe_participants();

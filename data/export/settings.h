@@ -83,6 +83,7 @@ struct ExportSettings {
   bool pages = false;  ///< with the answers to pages, which are personal data
   /// BIDS: samples as a motion recording in place of a physiological one.
   bool motion = false;
+  int jobs = 1;  ///< BIDS: threads that compress samples; the files do not depend on it
   /// Contacts of each sample of a trial, for the columns of contacts. An empty result: they are
   /// missing in this trial.
   std::function<std::vector<std::optional<TickContact>>(const StoredTrial&)> contacts = {};
@@ -108,12 +109,12 @@ struct ExportResult {
   std::string not_recorded;
 };
 
-/// Counts trials; calls `progress` every 256th.
+/// Counts trials; calls `progress` every 16th.
 class ProgressCounter {
  public:
   explicit ProgressCounter(const ExportSettings& settings) : settings_(settings) {}
   void next() {
-    constexpr std::int64_t kOften = 256;
+    constexpr std::int64_t kOften = 16;
     if (++trials_ % kOften == 0 && settings_.progress) settings_.progress(trials_);
   }
 

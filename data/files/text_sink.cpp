@@ -1,17 +1,33 @@
 #include "data/files/text_sink.h"
 
 #include <fcntl.h>
+#include <libdeflate.h>
 #include <unistd.h>
-#include <zlib.h>
 
-#include <array>
 #include <cerrno>
+#include <memory>
 #include <utility>
 
 #include "data/errors.h"
 #include "data/files/output_check.h"
 
 namespace palpate::data {
+namespace {
+
+constexpr std::size_t kMember = 4 << 20;  // bytes of text
+
+std::string gzip_member(std::string_view text) {
+  constexpr int kLevel = 6;  // files are as large as with zlib's 6; 9 saves another 2 %
+  using Compressor = std::unique_ptr<libdeflate_compressor, decltype(&libdeflate_free_compressor)>;
+  const Compressor compressor(libdeflate_alloc_compressor(kLevel), libdeflate_free_compressor);
+  if (!compressor) throw StoreError("the samples could not be compressed: out of memory");
+  std::string packed(libdeflate_gzip_compress_bound(compressor.get(), text.size()), '\0');
+  packed.resize(libdeflate_gzip_compress(compressor.get(), text.data(), text.size(), packed.data(),
+                                         packed.size()));
+  return packed;
+}
+
+}  // namespace
 
 FileSink::FileSink(const std::string& path)
     : FileSink(::open(path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0600), path) {}
@@ -55,35 +71,39 @@ void FileSink::fail(int error) const {
                    "; nothing was exported. Check the folder, its permissions and the free space");
 }
 
-struct GzipSink::Stream {
-  z_stream z{};
-};
+GzipSink::GzipSink(TextSink& out, int jobs)
+    : out_(out), jobs_(static_cast<std::size_t>(jobs > 1 ? jobs : 1)) {}
 
-GzipSink::GzipSink(TextSink& out) : out_(out), stream_(std::make_unique<Stream>()) {
-  constexpr int kLevel = 6;  // files are 17 % smaller than with 3; 9 saves another 1 %
-  constexpr int kGzip = 15 + 16;
-  if (deflateInit2(&stream_->z, kLevel, Z_DEFLATED, kGzip, 8, Z_DEFAULT_STRATEGY) != Z_OK) {
-    throw StoreError("the samples could not be compressed: out of memory");
+void GzipSink::write(std::string_view text) {
+  text_ += text;
+  while (text_.size() >= kMember) {
+    std::string rest = text_.substr(kMember);
+    text_.resize(kMember);
+    begin_member(std::exchange(text_, std::move(rest)));
   }
 }
 
-GzipSink::~GzipSink() { deflateEnd(&stream_->z); }
+void GzipSink::finish() {
+  // A gzip file has one member at least.
+  if (!text_.empty() || !any_) begin_member(std::exchange(text_, {}));
+  while (!members_.empty()) write_first();
+}
 
-void GzipSink::write(std::string_view text) { deflate_some(text, Z_NO_FLUSH); }
+void GzipSink::begin_member(std::string text) {
+  any_ = true;
+  if (jobs_ == 1) {
+    out_.write(gzip_member(text));
+    return;
+  }
+  if (members_.size() == jobs_) write_first();
+  members_.push_back(
+      std::async(std::launch::async, [text = std::move(text)] { return gzip_member(text); }));
+}
 
-void GzipSink::finish() { deflate_some({}, Z_FINISH); }
-
-void GzipSink::deflate_some(std::string_view text, int flush) {
-  std::array<char, 1 << 15> packed;
-  z_stream& z = stream_->z;
-  z.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(text.data()));
-  z.avail_in = static_cast<uInt>(text.size());  // a row at a time
-  do {
-    z.next_out = reinterpret_cast<Bytef*>(packed.data());
-    z.avail_out = packed.size();
-    deflate(&z, flush);
-    out_.write({packed.data(), packed.size() - z.avail_out});
-  } while (z.avail_out == 0);
+void GzipSink::write_first() {
+  const std::string packed = members_.front().get();
+  members_.pop_front();
+  out_.write(packed);
 }
 
 }  // namespace palpate::data

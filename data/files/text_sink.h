@@ -1,7 +1,8 @@
 #pragma once
 // Internal to data/: output streams for the text of exports, with errors that name the file.
 
-#include <memory>
+#include <deque>
+#include <future>
 #include <string>
 #include <string_view>
 
@@ -62,12 +63,13 @@ class FileSink : public TextSink {
   int descriptor_ = -1;
 };
 
-/// Compresses into another sink, as a gzip stream (RFC 1952) without name and time: the same text
-/// gives the same bytes.
+/// Compresses into another sink, as a gzip file (RFC 1952) without name and time: a member for each
+/// 4 MiB of text, so that several threads can work on one file. The same text gives the same bytes,
+/// however it is written and by how many threads.
 class GzipSink : public TextSink {
  public:
-  explicit GzipSink(TextSink& out);
-  ~GzipSink() override;
+  /// \param jobs  members that are compressed at the same time; 1: in this thread
+  explicit GzipSink(TextSink& out, int jobs = 1);
   GzipSink(const GzipSink&) = delete;
   GzipSink& operator=(const GzipSink&) = delete;
 
@@ -75,10 +77,13 @@ class GzipSink : public TextSink {
   void finish();
 
  private:
-  struct Stream;
-  void deflate_some(std::string_view text, int flush);
+  void begin_member(std::string text);
+  void write_first();
   TextSink& out_;
-  std::unique_ptr<Stream> stream_;
+  std::size_t jobs_;
+  std::string text_;
+  bool any_ = false;
+  std::deque<std::future<std::string>> members_;  ///< under way, in order
 };
 
 }  // namespace palpate::data

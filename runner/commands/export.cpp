@@ -124,13 +124,14 @@ struct Request {
   std::string database, format, out, codebook, about, meshes;
   data::Times times = data::Times::absolute;
   bool force = false, pages = false, motion = false, contacts = false, movement = false;
+  int jobs = 1;
 };
 
 void add_options(CommandLine& line) {
   line.usage =
       "palpate export --db FILE --format csv|bids|psych-ds --out PATH\n"
       "       [--times relative|absolute] [--codebook FILE] [--about FILE.json]\n"
-      "       [--motion] [--contacts] [--movement] [--meshes DIR] [--pages] [--force]";
+      "       [--motion] [--contacts] [--movement] [--meshes DIR] [--pages] [--jobs N] [--force]";
   line.summary =
       "Writes the trials of a database for others, completely or not at all. Can be used while a\n"
       "session runs. csv: every completed trial as a row of PATH, and the attempts that were cut\n"
@@ -182,6 +183,9 @@ void add_options(CommandLine& line) {
   add("meshes", po::value<std::string>()->default_value("", "")->value_name("DIR"),
       "with --contacts, --movement: folder of the protocol's mesh files, for an old database that "
       "does not have them; default: the working directory");
+  add("jobs", po::value<int>()->value_name("N"),
+      "bids: threads that compress samples; default: one for each core. The files do not depend on "
+      "it");
   add("force", po::bool_switch(), "replace an existing export");
 }
 
@@ -194,6 +198,14 @@ Request request_of(const po::variables_map& values, const std::string& usage) {
   request.motion = values["motion"].as<bool>();
   request.contacts = values["contacts"].as<bool>();
   request.movement = values["movement"].as<bool>();
+  request.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  if (values.count("jobs")) {
+    request.jobs = values["jobs"].as<int>();
+    constexpr int kMostJobs = 256;
+    if (request.jobs < 1 || request.jobs > kMostJobs)
+      throw UsageError("--jobs: must be 1 to 256, not " + std::to_string(request.jobs));
+    if (request.format != "bids") throw UsageError("--jobs: is for --format bids");
+  }
   if (request.format != "csv" && request.format != "bids" && request.format != "psych-ds") {
     throw UsageError("no format '" + request.format +
                      "'; there are: csv, bids, psych-ds\nUsage: " + usage);
@@ -229,6 +241,7 @@ data::ExportResult write_export(const Request& request) {
   Progress progress(store, output::catch_stop_signals());
   settings.progress = [&](std::int64_t trials) { progress.show(trials); };
   settings.motion = request.motion;
+  settings.jobs = request.jobs;
   MovementExport hand(store, request.meshes);
   if (request.contacts) hand.add_contacts(settings);
   if (request.movement) {

@@ -153,6 +153,7 @@ def data_lines():
                   "analyze --db moved.db --movement --protocol quick",
                   "export --db moved.db --format csv --out moved.csv", "analyze --csv moved.csv --json table.json",
                   "export --db moved.db --format bids --motion --contacts --movement --meshes . --about about.json --out bids --pages",
+                  "export --db moved.db --format bids --jobs 2 --out packed",
                   "export --db moved.db --format psych-ds --contacts --movement --out psych-ds",
                   "replay --db moved.db --trial S001/1/1 --compare --out both.csv --json replay.json --meshes . --protocol quick",
                   "replay --db moved.db --trial S001/1/1 --json replay.json --force",
