@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 #include "rendering/surface_search.h"
 
@@ -86,6 +87,18 @@ void split(std::span<const Vec3> middles, std::span<std::uint32_t> triangles, st
       [&](std::uint32_t p, std::uint32_t q) {
         return middles[p][axis] != middles[q][axis] ? middles[p][axis] < middles[q][axis] : p < q;
       });
+}
+
+/// Moves each element to its place, without a copy of the array.
+template <class T>
+void move_to(stimuli::LargeArray<T>& all, std::vector<std::uint32_t> place) {
+  for (std::uint32_t i = 0; i < all.size(); ++i) {
+    while (place[i] != i) {
+      const std::uint32_t to = place[i];
+      std::swap(all[i], all[to]);
+      std::swap(place[i], place[to]);
+    }
+  }
 }
 
 }  // namespace
@@ -227,17 +240,18 @@ void Surface::find_edges() {
 }
 
 void Surface::build_tree() {
-  std::vector<Vec3> middles(triangles_.size());
-  for (std::size_t i = 0; i < triangles_.size(); ++i) {
-    const auto& c = triangles_[i].corners;
-    middles[i] = (vertices_[c[0]] + vertices_[c[1]] + vertices_[c[2]]) / 3.0;
-  }
   std::vector<std::uint32_t> order(triangles_.size());
   std::iota(order.begin(), order.end(), 0U);
   nodes_.reserve(triangles_.size() / (kWidth - 1) + 16);
-  root_ = build_node(middles, order);
-  sort_by(order);
-  nodes_.shrink_to_fit();
+  {
+    std::vector<Vec3> middles(triangles_.size());
+    for (std::size_t i = 0; i < triangles_.size(); ++i) {
+      const auto& c = triangles_[i].corners;
+      middles[i] = (vertices_[c[0]] + vertices_[c[1]] + vertices_[c[2]]) / 3.0;
+    }
+    root_ = build_node(middles, order);
+  }
+  sort_by(order);  // a few places of nodes_ stay unused: to give them back would copy all
 }
 
 /// Sorts triangles and vertices as the tree has them: what is near in space is near in memory.
@@ -247,22 +261,19 @@ void Surface::sort_by(std::span<const std::uint32_t> order) {
   for (std::uint32_t i = 0; i < order.size(); ++i) place[order[i]] = i;
   constexpr std::uint32_t kNone = ~0U;
   std::vector<std::uint32_t> vertex_place(vertices_.size(), kNone);
-  stimuli::LargeArray<SurfaceTriangle> triangles;
-  stimuli::LargeArray<Vec3> vertices;
-  triangles.reserve(triangles_.size());
-  vertices.reserve(vertices_.size());
+  std::uint32_t used = 0;
   for (const std::uint32_t from : order) {
-    SurfaceTriangle& t = triangles.emplace_back(triangles_[from]);
+    SurfaceTriangle& t = triangles_[from];
     for (std::size_t k = 0; k < 3; ++k) {
       std::uint32_t& corner = vertex_place[t.corners[k]];
-      if (corner == kNone) {
-        corner = static_cast<std::uint32_t>(vertices.size());
-        vertices.push_back(vertices_[t.corners[k]]);
-      }
+      if (corner == kNone) corner = used++;
       t.corners[k] = corner;
       t.across[k] = place[SurfaceTriangle::triangle_of(t.across[k])] << 2 |
                     SurfaceTriangle::side_of(t.across[k]);
     }
+  }
+  for (std::uint32_t& corner : vertex_place) {
+    if (corner == kNone) corner = used++;  // of no triangle: to the end
   }
   const auto rename = [&](const auto& self, std::uint32_t name) -> void {
     Node& node = nodes_[index_of(name)];
@@ -275,8 +286,8 @@ void Surface::sort_by(std::span<const std::uint32_t> order) {
     }
   };
   rename(rename, root_);
-  triangles_ = std::move(triangles);
-  vertices_ = std::move(vertices);
+  move_to(triangles_, place);
+  move_to(vertices_, std::move(vertex_place));
   std::erase_if(file_order_, [&](std::uint32_t i) { return triangles_[i].is_back(); });
 }
 

@@ -58,6 +58,17 @@ std::string shape_key(const stimuli::ObjectSpec& spec, bool side_contact) {
          spec.file;
 }
 
+/// Of a mesh file and its material: of the surface that stands alone.
+std::string surface_key(const stimuli::ObjectSpec& spec) {
+  std::string key = shape_key(spec, false);
+  const stimuli::Material& m = spec.material;
+  for (const double value : {m.stiffness, m.damping, m.friction_static, m.friction_dynamic})
+    key += ' ' + key_of(value);
+  return key;
+}
+
+constexpr std::size_t kLargeMesh = 50'000;  // faces; worth another thread
+
 /// What object i may collide with, for messages: the first object that moves, or if it moves
 /// itself the first other one. Empty: nothing.
 std::string met_by(const std::vector<stimuli::ObjectSpec>& objects, std::size_t i) {
@@ -307,10 +318,35 @@ void SceneBuilder::place(const stimuli::ObjectSpec& spec, const Pose& parent, in
   if (!spec.material.layers.empty()) placing.layered.push_back({&spec, pose, object});
 }
 
+/// Prepares the surface for the law while it is checked, and gives the polygons up on the way.
+void SceneBuilder::take_large_surface(const stimuli::ObjectSpec& spec, stimuli::PolygonSoup soup,
+                                      LoadedMesh& loaded) {
+  std::shared_ptr<const rendering::Surface> prepared;
+  const auto prepare_it = [&](const stimuli::ClosedSurface& unchecked) {
+    if (!(spec.material.stiffness > 0)) return;
+    stimuli::Material material = spec.material;
+    material.layers.clear();
+    const std::vector<rendering::SurfaceShell> shells = {
+        {std::shared_ptr<const stimuli::ClosedSurface>(std::shared_ptr<void>(), &unchecked), Pose{},
+         std::move(material)}};
+    prepared = std::make_shared<const rendering::Surface>(shells);
+  };
+  stimuli::CleanedSurface cleaned;
+  try {
+    cleaned = stimuli::closed_surface(std::move(soup), prepare_it);
+  } catch (const stimuli::MeshError&) {
+    cleaned = stimuli::closed_surface(stimuli::polygons_of(spec));  // names the faces
+  }
+  if (prepared != nullptr && cleaned.surface.at_pockets.empty())
+    surfaces_.emplace(surface_key(spec), std::move(prepared));
+  loaded.surface = std::make_shared<const stimuli::ClosedSurface>(std::move(cleaned.surface));
+  loaded.notes = std::move(cleaned.notes);
+}
+
 const LoadedMesh& SceneBuilder::mesh(const stimuli::ObjectSpec& spec) {
   const std::string key = shape_key(spec, false);
   if (const auto known = meshes_.find(key); known != meshes_.end()) return known->second;
-  const stimuli::PolygonSoup soup = stimuli::polygons_of(spec);
+  stimuli::PolygonSoup soup = stimuli::polygons_of(spec);
   LoadedMesh loaded{box_of(soup), soup.faces.size(), soup.group_names.size() > 1, {}, {}, {}};
   const auto take_surface = [&] {
     stimuli::CleanedSurface cleaned = stimuli::closed_surface(soup);
@@ -318,7 +354,9 @@ const LoadedMesh& SceneBuilder::mesh(const stimuli::ObjectSpec& spec) {
     loaded.notes = std::move(cleaned.notes);
   };
   auto parts = stimuli::convex_as_it_is(soup);
-  if (!parts) {
+  if (!parts && soup.faces.size() >= kLargeMesh) {
+    take_large_surface(spec, std::move(soup), loaded);
+  } else if (!parts) {
     take_surface();
   } else if (parts->size() == 1) {
     loaded.parts = shared(std::move(*parts));
@@ -543,12 +581,9 @@ SceneBuilder::Placed SceneBuilder::placed(const std::vector<stimuli::ObjectSpec>
     out.solids.clear();  // its parts without force serve as solids
     return out;
   }
-  const stimuli::Material& m = first.material;
   std::string key;
   if (alone && first.shape == stimuli::ShapeKind::mesh) {
-    key = shape_key(first, false);
-    for (const double value : {m.stiffness, m.damping, m.friction_static, m.friction_dynamic})
-      key += ' ' + key_of(value);
+    key = surface_key(first);
     if (const auto known = surfaces_.find(key); known != surfaces_.end())
       placed.surface = known->second;
   }

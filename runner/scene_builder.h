@@ -98,6 +98,8 @@ class SceneBuilder {
   /// Whether the object is felt as one closed surface, not as convex parts.
   bool is_surface(const stimuli::ObjectSpec& spec);
   bool has_concave(const stimuli::ObjectSpec& spec);
+  void take_large_surface(const stimuli::ObjectSpec& spec, stimuli::PolygonSoup soup,
+                          LoadedMesh& loaded);
   void add_shells(const stimuli::ObjectSpec& spec, const Pose& in_object, bool felt,
                   std::vector<rendering::SurfaceShell>& shells);
   void place_layers(int object, Placing& placing);

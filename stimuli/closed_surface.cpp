@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
+#include <future>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -16,6 +17,10 @@
 #include "stimuli/half_edges.h"
 #include "stimuli/mesh_names.h"
 #include "stimuli/polygon_soup.h"
+
+#if defined(__GLIBC__)
+#include <malloc.h>
+#endif
 
 namespace palpate::stimuli {
 namespace {
@@ -42,6 +47,14 @@ class Cleaner {
  public:
   explicit Cleaner(const PolygonSoup& soup) : soup_(soup), naming_(soup.names) {}
 
+  /// Gives the soup up when it is welded.
+  CleanedSurface run_while(PolygonSoup& own,
+                           const std::function<void(const ClosedSurface&)>& meanwhile) {
+    given_up_ = &own;
+    meanwhile_ = &meanwhile;
+    return run();
+  }
+
   CleanedSurface run() {
     check_numbers(soup_);
     take_corners();
@@ -66,8 +79,8 @@ class Cleaner {
            (std::string("corners, each") + text).c_str());
     }
     ClosedSurface surface = take_surface();
-    Pockets pockets = check_winding(surface, kFlatErrors * error_,
-                                    [&](Index t) { return name_of_face(soup_, face_[t]); });
+    surface.coordinate_error = soup_.coordinate_error;
+    Pockets pockets = given_up_ ? checked_meanwhile(surface) : checked(surface);
     if (pockets.depth > 0) {
       char text[200];
       std::snprintf(text, sizeof text,
@@ -83,6 +96,25 @@ class Cleaner {
  private:
   void note(std::size_t count, const char* one, const char* many) {
     if (count > 0) notes_.push_back(counted(count, one, many));
+  }
+
+  Pockets checked(const ClosedSurface& surface) const {
+    return check_winding(surface, kFlatErrors * error_,
+                         [this](Index t) { return name_of_face(soup_, face_[t]); });
+  }
+
+  Pockets checked_meanwhile(const ClosedSurface& surface) {
+    const auto forget = [](auto&... all) { ((all = {}, all.shrink_to_fit()), ...); };
+    forget(given_up_->vertices, given_up_->faces, points_, point_of_, vertex_, face_, bent_);
+#if defined(__GLIBC__)
+    malloc_trim(0);  // the faces were many small pieces
+#endif
+    std::future<Pockets> pockets = std::async(std::launch::async, [this, &surface] {
+      return check_winding(surface, kFlatErrors * error_,
+                           [](Index) { return std::string("a face"); });
+    });
+    (*meanwhile_)(surface);
+    return pockets.get();
   }
 
   // Corners that no face uses are left out: they must not make the object seem larger than it is.
@@ -534,6 +566,8 @@ class Cleaner {
   }
 
   const PolygonSoup& soup_;
+  PolygonSoup* given_up_ = nullptr;  // the same, if it need not be kept
+  const std::function<void(const ClosedSurface&)>* meanwhile_ = nullptr;
   const MeshNaming naming_;
   std::vector<std::string> notes_;
   std::vector<Index> point_of_;  // of each vertex of the soup
@@ -565,10 +599,12 @@ Index kept_for(std::vector<Index>& kept, Index i) {
 
 }  // namespace
 
-CleanedSurface closed_surface(const PolygonSoup& soup) {
-  CleanedSurface cleaned = Cleaner(soup).run();
-  cleaned.surface.coordinate_error = soup.coordinate_error;
-  return cleaned;
+CleanedSurface closed_surface(const PolygonSoup& soup) { return Cleaner(soup).run(); }
+
+CleanedSurface closed_surface(PolygonSoup&& soup,
+                              const std::function<void(const ClosedSurface&)>& meanwhile) {
+  PolygonSoup own = std::move(soup);
+  return Cleaner(own).run_while(own, meanwhile);
 }
 
 std::vector<Index> weld_equal(const std::vector<Vec3>& points) {

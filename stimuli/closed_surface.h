@@ -40,6 +40,12 @@ struct CleanedSurface {
 /// turned, inside out, winds round some place a negative number of times, not finite, too large.
 CleanedSurface closed_surface(const PolygonSoup& soup);
 
+/// The same for a large mesh: gives up the polygons as soon as they are welded, and calls
+/// `meanwhile` with the surface, which may still turn out to be no solid, in this thread while
+/// another one checks how it winds. `at_pockets` is empty then. Faults name no faces.
+CleanedSurface closed_surface(PolygonSoup&& soup,
+                              const std::function<void(const ClosedSurface&)>& meanwhile);
+
 // Merging of points that coincide.
 
 /// For each point the number of the first point at the same place.

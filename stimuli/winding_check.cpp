@@ -28,10 +28,41 @@ struct Box {
     low = glm::min(low, box.low);
     high = glm::max(high, box.high);
   }
-  double extent() const { return high.x - low.x + (high.y - low.y) + (high.z - low.z); }  // m
   bool meets(const Box& box) const {
     return low.x <= box.high.x && box.low.x <= high.x && low.y <= box.high.y &&
            box.low.y <= high.y && low.z <= box.high.z && box.low.z <= high.z;
+  }
+};
+
+/// A box in single precision, rounded outwards: half the memory.
+struct SmallBox {
+  std::array<float, 3> low{}, high{};
+
+  SmallBox() = default;
+  explicit SmallBox(const Box& box) {
+    constexpr float kInfinity = std::numeric_limits<float>::infinity();
+    for (int k = 0; k < 3; ++k) {
+      const auto i = static_cast<std::size_t>(k);
+      low[i] = static_cast<float>(box.low[k]);
+      if (static_cast<double>(low[i]) > box.low[k]) low[i] = std::nextafter(low[i], -kInfinity);
+      high[i] = static_cast<float>(box.high[k]);
+      if (static_cast<double>(high[i]) < box.high[k]) high[i] = std::nextafter(high[i], kInfinity);
+    }
+  }
+  void add(const SmallBox& box) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      low[k] = std::min(low[k], box.low[k]);
+      high[k] = std::max(high[k], box.high[k]);
+    }
+  }
+  Vec3 lowest() const { return {low[0], low[1], low[2]}; }
+  Vec3 highest() const { return {high[0], high[1], high[2]}; }
+  float extent() const { return high[0] - low[0] + (high[1] - low[1]) + (high[2] - low[2]); }  // m
+  bool meets(const SmallBox& box) const {
+    for (std::size_t k = 0; k < 3; ++k) {
+      if (low[k] > box.high[k] || box.low[k] > high[k]) return false;
+    }
+    return true;
   }
 };
 
@@ -116,7 +147,7 @@ std::vector<Index> sheets_of(const ClosedSurface& surface, double tolerance) {
 class Tree {
  public:
   struct Node {
-    Box box;
+    SmallBox box;
     Index begin = 0, end = 0;  ///< of `order`
     Index right = 0;           ///< the left child is the next node; 0: a leaf
     Index sheet = 0;           ///< of all its triangles, or kNoSheet
@@ -184,10 +215,12 @@ class Tree {
     const std::size_t self = nodes_.size();
     nodes_.push_back({{}, begin, end, 0, sheet_[order_[begin]]});
     if (end - begin <= kLeaf) {
+      Box all;
       for (Index i = begin; i < end; ++i) {
-        nodes_[self].box.add(box(order_[i]));
+        all.add(box(order_[i]));
         if (sheet_[order_[i]] != nodes_[self].sheet) nodes_[self].sheet = kNoSheet;
       }
+      nodes_[self].box = SmallBox(all);
       return;
     }
     // Split between shells, else where the highest bit changes; halve equal keys.
@@ -313,9 +346,8 @@ class WindingCheck {
     while (left > 0) {
       const Index at = stack[--left];
       const Tree::Node& node = tree_->nodes()[at];
-      if (q.x < node.box.low.x || q.x > node.box.high.x || q.y < node.box.low.y ||
-          q.y > node.box.high.y || q.z > node.box.high.z)
-        continue;
+      const Vec3 low = node.box.lowest(), high = node.box.highest();
+      if (q.x < low.x || q.x > high.x || q.y < low.y || q.y > high.y || q.z > high.z) continue;
       if (node.right != 0) {
         stack[left++] = node.right;
         stack[left++] = at + 1;
@@ -515,9 +547,9 @@ class WindingCheck {
   }
 
   // Whether each triangle of a leaf is apart from the box: of a long one, much of its own box is.
-  bool is_apart(const Tree::Node& leaf, const Box& box) const {
+  bool is_apart(const Tree::Node& leaf, const SmallBox& box) const {
     if (leaf.right != 0) return false;
-    const Vec3 middle = 0.5 * (box.low + box.high), half = box.high - middle;
+    const Vec3 middle = 0.5 * (box.lowest() + box.highest()), half = box.highest() - middle;
     const auto beyond = [&](const Vec3& way, const Vec3& from) {
       const double reach = glm::dot(glm::abs(way), half) + tolerance_ * glm::length(way);
       return glm::dot(way, middle - from) - reach;
