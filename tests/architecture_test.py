@@ -69,8 +69,10 @@ MAY_INCLUDE = {
     "runner/evidence": set(),
     "runner/evidence/verification": RENDERING,
     "runner/evidence/accuracy": BODIES | {"runner/evidence/verification", "rendering/bodies/soft"},
+    "runner/evidence/scenes": BODIES | {"protocols", "rendering/bodies/soft", "runner", "runner/evidence", "runner/evidence/accuracy",
+                               "runner/evidence/verification", "runner/touch"},
     "runner/evidence/stability": SERVO | {"protocols", "rendering/bodies", "runner/devices"},
-    "runner/evidence/reports": SERVO | {"runner/evidence/accuracy", "runner/evidence/stability", "runner/evidence/verification", "analysis",
+    "runner/evidence/reports": SERVO | {"runner/evidence/accuracy", "runner/evidence/scenes", "runner/evidence/stability", "runner/evidence/verification", "analysis",
                                          "analysis/figures", "analysis/report", "analysis/statistics"},
 }
 # The commands, the Python module and main() may include everything.
@@ -100,15 +102,16 @@ def room_of(name):
     return folder
 
 # What verifies the renderer takes it apart: these see its every header.
-LOOKS_INSIDE = {"runner/evidence/accuracy", "runner/evidence/verification"}
+LOOKS_INSIDE = {"runner/evidence/accuracy", "runner/evidence/scenes", "runner/evidence/verification"}
 # The headers of a room that other rooms use; all others are the room's own business (and that of the rooms within).
 PUBLIC = {
     "stimuli": "closed_surface shapes convex_mesh grid_hull inset large_array mesh_file orientation polygon_soup "
                "parts/convex_parts parts/facets primitives solids/solid_mesh vec",
     "rendering": "first_contact probe reach render_fault renderer scene tool",
     "rendering/bodies": "moving_scene",
-    "runner/evidence/verification": "explain extreme_cases random_solids reference search union_cases",
-    "runner/evidence/accuracy": "body_study paper_first_contact peers study union_study",
+    "runner/evidence/verification": "explain extreme_cases random_solids reference search surface_reference union_cases",
+    "runner/evidence/scenes": "scene_study",
+    "runner/evidence/accuracy": "body_study methods paper_first_contact peers study union_study",
     "rendering/bodies/soft": "soft_scene",
     "protocols": "answer_keys difference groups json_document parse protocol schedule session_plan sweep_space "
                  "tasks/block_order tasks/block_procedures tasks/levels tasks/texts",
@@ -147,7 +150,7 @@ PUBLIC = {
     "runner/station": "admission opening protocol_choice run_settings",
     "runner/touch": "forces live_touch scene_notes trial_page",
     "runner/movement": "movement_study touched_trial",
-    "runner/evidence/reports": "accuracy_report stability_report stability_study",
+    "runner/evidence/reports": "accuracy_report scene_report stability_report stability_study",
     "runner/registration": "about_file answers bundle_contents deviations planned_conditions planned_studies registration registration_text sealed_folder",
     "runner/study": "export_settings simulation_limits study_order study_trials task_words",
     "runner/serve": "network served_scene served_session",

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <functional>
 #include <iostream>
 #include <span>
@@ -11,17 +12,24 @@
 #include <vector>
 
 #include "analysis/figures/svg.h"
+#include "protocols/parse.h"
 #include "rendering/first_contact.h"
+#include "rendering/renderer.h"
 #include "runner/commands/shared/command.h"
 #include "runner/evidence/reports/accuracy_report.h"
+#include "runner/evidence/reports/scene_report.h"
+#include "runner/evidence/scenes/scene_study.h"
 #include "runner/output/outputs.h"
 #include "runner/output/progress_line.h"
+#include "runner/touch/forces.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::commands {
 namespace {
+
+namespace po = boost::program_options;
 
 void study_first_contacts(evidence::AccuracyReport& report, int entries) {
   struct Shape {
@@ -83,6 +91,25 @@ void time_first_contact(evidence::AccuracyReport& report) {
                    .feature.kind != rendering::ContactFeature::Kind::none;
       });
   if (found > 0) throw std::runtime_error("a motion off the cube was taken for a contact");
+}
+
+/// Scenes of every kind, with the times of each method.
+void study_every_scene(evidence::AccuracyReport& report, bool quick) {
+  output::ProgressLine progress("scenes");
+  evidence::SceneStudySettings settings;
+  if (quick) {
+    settings.ticks = std::min(500, 10 * report.settings.contact_ticks);
+    settings.rounds = 1;
+    settings.cold = 50;
+  }
+  std::vector<evidence::StudiedScene> scenes = evidence::study_scenes();
+  const auto count = static_cast<double>(scenes.size());
+  double done = 0;
+  for (evidence::StudiedScene& scene : scenes) {
+    report.scenes.push_back(evidence::study_scene(
+        std::move(scene), settings, [&](double part) { progress.show((done + part) / count); }));
+    done += 1;
+  }
 }
 
 /// \param quick  skips the case whose mesh takes seconds to build
@@ -167,6 +194,7 @@ void measure_accuracy(evidence::AccuracyReport& report, bool quick, int jobs, st
     report.soft = evidence::soft_study(quick, output::now_ns,
                                        [&progress](double done) { progress.show(done); });
   }
+  study_every_scene(report, quick);
   run_extreme_cases(report, quick);
   constexpr std::uint64_t kShortSearch = 100'000;
   report.search_seed = seed;
@@ -189,6 +217,37 @@ void check_range(const char* option, int value, int low, int high) {
                    std::to_string(high) + ", not " + std::to_string(value));
 }
 
+/// `palpate accuracy SCENE.json`.
+void study_users_scene(const po::variables_map& values, output::Outputs& outputs) {
+  const std::string path = values["scene"].as<std::string>();
+  evidence::StudiedScene scene;
+  scene.name = std::filesystem::path(path).filename().string();
+  scene.spec = protocols::parse_scene(path);
+  for (const stimuli::ObjectSpec& object : scene.spec.objects) outputs.protect(object);
+  if (values.count("trajectory"))
+    scene.paths = {touch::read_trajectory(values["trajectory"].as<std::string>())};
+  evidence::SceneStudySettings settings;
+  const std::string renderer = values["renderer"].as<std::string>();
+  settings.ray = &touch::renderer_named(renderer) == &rendering::ray_renderer();
+  settings.seed = values["seed"].as<std::uint64_t>();
+  if (values.count("ticks")) settings.ticks = values["ticks"].as<int>();
+  if (values.count("quick")) {
+    settings.rounds = 1;
+    settings.cold = 100;
+  }
+  output::ProgressLine progress("methods");
+  const evidence::SceneStudy study = evidence::study_scene(
+      std::move(scene), settings, [&progress](double done) { progress.show(done); });
+  outputs.put("json", evidence::scene_json(study).dump(1) + "\n");
+  if (outputs.wanted("figure")) {
+    outputs.put("figure",
+                analysis::figure_svg(evidence::scene_figure({study}), analysis::light_palette()));
+  }
+  if (outputs.wanted("report")) outputs.put("report", evidence::scene_page(study));
+  outputs.write();
+  std::cout << evidence::scene_text(study);
+}
+
 void check_ticks(std::uint64_t ticks, bool searching) {
   constexpr std::uint64_t kMost = 1'000'000'000'000;
   if (searching && (ticks == 0 || ticks > kMost)) {
@@ -201,16 +260,26 @@ void check_ticks(std::uint64_t ticks, bool searching) {
 int accuracy_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage =
-      "palpate accuracy [--quick | --search TICKS [--unions]] [--report FILE.html] [--figure "
+      "palpate accuracy SCENE.json [--renderer point|ray] [--trajectory T.csv] [--report "
+      "FILE.html] "
+      "[--figure FILE.svg]\n"
+      "                [--json FILE]\n"
+      "       palpate accuracy [--quick | --search TICKS [--unions]] [--report FILE.html] "
+      "[--figure "
       "FILE.svg] "
       "[--json FILE]";
   line.summary =
       "Error of the rendered forces against run time: every method over every tessellation of\n"
       "every analytic shape, and which tessellation to choose; contact with concave objects and\n"
-      "with tools of several segments, compared with simpler methods; soft bodies. Takes four\n"
-      "minutes, with --quick half a minute. Status 1 when a tick of the search is wrong or an\n"
-      "extreme case fails.";
+      "with tools of several segments, compared with simpler methods; soft bodies; scenes of "
+      "every\n"
+      "kind. Takes five minutes, with --quick one. Status 1 when a tick of the search is wrong or\n"
+      "an extreme case fails. With a scene: the same for it, with every method that can show it\n"
+      "(the renderer, coarser meshes, convex hulls, other libraries), beside the exact answer, "
+      "and\n"
+      "which to choose.";
   line.example =
+      "  palpate accuracy SCENE.json --report accuracy.html\n"
       "  palpate accuracy --quick\n"
       "  palpate accuracy --report accuracy.html --json accuracy.json\n"
       "  palpate accuracy --search 10000000   (random solids and paths against brute force)\n"
@@ -220,8 +289,14 @@ int accuracy_command(const std::vector<std::string>& args) {
   evidence::AccuracySettings settings;
   int jobs = 0;
   auto add = line.options.add_options();
-  namespace po = boost::program_options;
   add("quick", "fewer and shorter paths, at most 20,480 triangles");
+  add("scene", po::value<std::string>()->value_name("FILE"),
+      "scene, JSON; or a mesh file, alone: compare methods on it");
+  add("renderer", po::value<std::string>()->value_name("NAME")->default_value("ray"),
+      "of the scene: point or ray");
+  add("trajectory", po::value<std::string>()->value_name("FILE"),
+      "of the scene: path of the stylus, CSV as of palpate render; default: a hand strokes each "
+      "object, up to four");
   add("paths", po::value<int>()->value_name("N"), "paths for each shape and probe; default 4");
   add("ticks", po::value<int>()->value_name("N"), "ticks of contact of each path; default 1000");
   add("most-triangles", po::value<int>()->value_name("N"),
@@ -238,6 +313,7 @@ int accuracy_command(const std::vector<std::string>& args) {
   add("jobs", po::value(&jobs)->value_name("J"),
       "threads of the search; default: one for each core");
   add("force", "replace existing files");
+  line.positional.add("scene", 1);
   const auto values = line.parse(args);
   if (!values) return 0;
   const bool searching = values->count("search") > 0;
@@ -255,8 +331,16 @@ int accuracy_command(const std::vector<std::string>& args) {
   const bool unions = values->count("unions") > 0;
   if (unions && !searching) throw UsageError("--unions: goes with --search");
   if (searching && !figure.empty()) throw UsageError("--figure: a search has no figure");
-  output::Outputs outputs(*values, {"json", "figure", "report"}, {});
-
+  output::Outputs outputs(*values, {"json", "figure", "report"}, {"scene", "trajectory"});
+  if (values->count("scene")) {
+    for (const char* other : {"search", "unions", "paths", "most-triangles", "jobs"}) {
+      if (values->count(other))
+        throw UsageError("--" + std::string(other) + ": does not go with a scene");
+    }
+    study_users_scene(*values, outputs);
+    return 0;
+  }
+  if (values->count("trajectory")) throw UsageError("--trajectory: goes with a scene");
   evidence::AccuracyReport report;
   if (jobs == 0) jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   if (searching) {

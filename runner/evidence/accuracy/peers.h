@@ -3,8 +3,11 @@
 // of a segment in a convex mesh. For comparisons, not for the servo: they allocate and do not keep
 // to a side. Optional: built if CMake finds them (PALPATE_PEERS).
 
+#include <array>
+#include <cstdint>
 #include <memory>
 #include <span>
+#include <vector>
 
 #include "rendering/probe.h"
 #include "stimuli/convex_mesh.h"
@@ -32,11 +35,24 @@ class Peer {
 /// The mesh must outlive the peer.
 using MakePeer = std::unique_ptr<Peer> (*)(const stimuli::ConvexMesh& mesh);
 
+/// A closed mesh of triangles, outward, as these libraries hold concave ones: a surface without an
+/// inside.
+struct PeerMesh {
+  std::vector<Vec3> vertices;  ///< m
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  Vec3 centre;        ///< m, of a sphere around it
+  double radius = 0;  ///< m
+};
+/// The deepest contact of a thin capsule (a thousandth of the radius) with the triangles.
+using MakeMeshPeer = std::unique_ptr<Peer> (*)(const PeerMesh& mesh);
+
 struct PeerLibrary {
-  const char* name;     ///< "bullet", "fcl"
-  const char* version;  ///< "3.24"; empty when absent
-  const char* method;   ///< the algorithm used
-  MakePeer make;        ///< null if this build lacks it
+  const char* name;         ///< "bullet", "fcl"
+  const char* version;      ///< "3.24"; empty when absent
+  const char* method;       ///< the algorithm used
+  MakePeer make;            ///< null if this build lacks it
+  const char* mesh_method;  ///< the algorithm used on meshes of triangles
+  MakeMeshPeer make_mesh;   ///< null if this build lacks it
 };
 
 /// All known libraries, including those absent from this build.

@@ -1,6 +1,14 @@
 // Bullet: GJK, and EPA if it finds an overlap. https://pybullet.org, zlib licence.
 
+#include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
+#include <BulletCollision/CollisionDispatch/btCollisionDispatcher.h>
+#include <BulletCollision/CollisionDispatch/btCollisionObjectWrapper.h>
+#include <BulletCollision/CollisionDispatch/btCollisionWorld.h>
+#include <BulletCollision/CollisionDispatch/btDefaultCollisionConfiguration.h>
+#include <BulletCollision/CollisionShapes/btBvhTriangleMeshShape.h>
+#include <BulletCollision/CollisionShapes/btCapsuleShape.h>
 #include <BulletCollision/CollisionShapes/btConvexInternalShape.h>
+#include <BulletCollision/CollisionShapes/btTriangleMesh.h>
 #include <BulletCollision/NarrowPhaseCollision/btGjkEpa2.h>
 
 #include <cmath>
@@ -70,7 +78,76 @@ class Bullet final : public Peer {
   btVector3 guess_{1, 0, 0};
 };
 
+class BulletMesh final : public Peer {
+ public:
+  explicit BulletMesh(const PeerMesh& mesh) : centre_(mesh.centre), radius_(mesh.radius) {
+    for (const auto& t : mesh.triangles) {
+      triangles_.addTriangle(scaled(mesh.vertices[t[0]]), scaled(mesh.vertices[t[1]]),
+                             scaled(mesh.vertices[t[2]]));
+    }
+    shape_ = std::make_unique<btBvhTriangleMeshShape>(&triangles_, true);
+    shape_->setMargin(0);
+    solid_.setCollisionShape(shape_.get());
+    world_.addCollisionObject(&solid_);
+  }
+  ~BulletMesh() override { world_.removeCollisionObject(&solid_); }
+  BulletMesh(const BulletMesh&) = delete;
+  BulletMesh& operator=(const BulletMesh&) = delete;
+
+  PeerContact contact(const rendering::LineProbe& probe) override {
+    const btVector3 tip = scaled(probe.tip), way = scaled(probe.tail) - tip;
+    btCapsuleShapeZ capsule(kThin, way.length());
+    btCollisionObject rod;
+    rod.setCollisionShape(&capsule);
+    btTransform pose(btQuaternion::getIdentity(), tip + 0.5 * way);
+    if (way.length() > 0) {
+      const btVector3 z = way.normalized();
+      pose.setRotation(z.z() < -0.999999 ? btQuaternion(1, 0, 0, 0)
+                                         : shortestArcQuat(btVector3(0, 0, 1), z));
+    }
+    rod.setWorldTransform(pose);
+    Deepest deepest(&rod);
+    world_.contactPairTest(&rod, &solid_, deepest);
+    if (deepest.depth < 0) return {-1, Vec3(), Vec3()};
+    return {deepest.depth * radius_, from_bullet(deepest.normal),
+            centre_ + radius_ * from_bullet(deepest.point)};
+  }
+
+ private:
+  struct Deepest final : btCollisionWorld::ContactResultCallback {
+    explicit Deepest(const btCollisionObject* moving) : rod(moving) {}
+    btScalar addSingleResult(btManifoldPoint& found, const btCollisionObjectWrapper* first, int,
+                             int, const btCollisionObjectWrapper*, int, int) override {
+      if (-found.getDistance() <= depth) return 0;
+      const bool rod_first = first->getCollisionObject() == rod;
+      depth = -found.getDistance();
+      normal = rod_first ? found.m_normalWorldOnB : -found.m_normalWorldOnB;
+      point = rod_first ? found.getPositionWorldOnB() : found.getPositionWorldOnA();
+      return 0;
+    }
+    const btCollisionObject* rod;
+    double depth = -1;
+    btVector3 normal{0, 0, 0}, point{0, 0, 0};
+  };
+
+  btVector3 scaled(const Vec3& v) const { return to_bullet((v - centre_) / radius_); }
+
+  Vec3 centre_;
+  double radius_;
+  btTriangleMesh triangles_;
+  std::unique_ptr<btBvhTriangleMeshShape> shape_;
+  btDefaultCollisionConfiguration configuration_;
+  btCollisionDispatcher dispatcher_{&configuration_};
+  btDbvtBroadphase broadphase_;
+  btCollisionWorld world_{&dispatcher_, &broadphase_, &configuration_};
+  btCollisionObject solid_;
+};
+
 }  // namespace
+
+std::unique_ptr<Peer> make_bullet_mesh(const PeerMesh& mesh) {
+  return std::make_unique<BulletMesh>(mesh);
+}
 
 std::unique_ptr<Peer> make_bullet(const stimuli::ConvexMesh& mesh) {
   return std::make_unique<Bullet>(mesh);

@@ -10,6 +10,9 @@
 #ifndef NDEBUG
 #define NDEBUG
 #endif
+#include <fcl/geometry/bvh/BVH_model.h>
+#include <fcl/geometry/shape/capsule.h>
+#include <fcl/narrowphase/collision.h>
 #include <fcl/narrowphase/detail/convexity_based_algorithm/gjk_libccd.h>
 
 #include <cmath>
@@ -83,7 +86,59 @@ class Fcl final : public Peer {
   ccd_t settings_;
 };
 
+class FclMesh final : public Peer {
+ public:
+  explicit FclMesh(const PeerMesh& mesh) : centre_(mesh.centre), radius_(mesh.radius) {
+    std::vector<fcl::Vector3d> vertices;
+    std::vector<fcl::Triangle> triangles;
+    for (const Vec3& v : mesh.vertices) vertices.push_back(scaled(v));
+    for (const auto& t : mesh.triangles) triangles.emplace_back(t[0], t[1], t[2]);
+    model_.beginModel();
+    model_.addSubModel(vertices, triangles);
+    model_.endModel();
+  }
+
+  PeerContact contact(const rendering::LineProbe& probe) override {
+    const fcl::Vector3d tip = scaled(probe.tip), way = scaled(probe.tail) - tip;
+    const fcl::Capsuled capsule(kThin, way.norm());
+    fcl::Transform3d pose = fcl::Transform3d::Identity();
+    if (way.norm() > 0) {
+      pose.linear() =
+          Eigen::Quaterniond::FromTwoVectors(fcl::Vector3d::UnitZ(), way).toRotationMatrix();
+    }
+    pose.translation() = tip + 0.5 * way;
+    constexpr std::size_t kContacts = 256;
+    const fcl::CollisionRequestd request(kContacts, true);
+    fcl::CollisionResultd result;
+    fcl::collide<double>(&model_, fcl::Transform3d::Identity(), &capsule, pose, request, result);
+    PeerContact deepest{-1, Vec3(), Vec3()};
+    for (std::size_t i = 0; i < result.numContacts(); ++i) {
+      const fcl::Contactd& one = result.getContact(i);
+      if (one.penetration_depth * radius_ <= deepest.depth) continue;
+      deepest.depth = one.penetration_depth * radius_;
+      // Its normal points from the first object to the second one.
+      deepest.normal = Vec3(one.normal[0], one.normal[1], one.normal[2]);
+      deepest.point = centre_ + radius_ * Vec3(one.pos[0], one.pos[1], one.pos[2]);
+    }
+    return deepest;
+  }
+
+ private:
+  fcl::Vector3d scaled(const Vec3& v) const {
+    const Vec3 unit = (v - centre_) / radius_;
+    return {unit.x, unit.y, unit.z};
+  }
+
+  Vec3 centre_;
+  double radius_;
+  fcl::BVHModel<fcl::OBBRSSd> model_;
+};
+
 }  // namespace
+
+std::unique_ptr<Peer> make_fcl_mesh(const PeerMesh& mesh) {
+  return std::make_unique<FclMesh>(mesh);
+}
 
 std::unique_ptr<Peer> make_fcl(const stimuli::ConvexMesh& mesh) {
   return std::make_unique<Fcl>(mesh);

@@ -50,5 +50,9 @@ struct Segment {
 
 std::unique_ptr<Peer> make_bullet(const stimuli::ConvexMesh& mesh);
 std::unique_ptr<Peer> make_fcl(const stimuli::ConvexMesh& mesh);
+std::unique_ptr<Peer> make_bullet_mesh(const PeerMesh& mesh);
+std::unique_ptr<Peer> make_fcl_mesh(const PeerMesh& mesh);
+
+constexpr double kThin = 1e-3;  ///< of the radius: of the capsule that stands for a segment
 
 }  // namespace palpate::runner::evidence::peers

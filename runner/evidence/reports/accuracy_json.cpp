@@ -1,5 +1,6 @@
 #include "runner/evidence/accuracy/peers.h"
 #include "runner/evidence/reports/accuracy_report.h"
+#include "runner/evidence/reports/scene_report.h"
 
 namespace palpate::runner::evidence {
 namespace {
@@ -219,6 +220,7 @@ Json accuracy_json(const AccuracyReport& report) {
     json["bodies"]["eleven_us"] = {{"median", cost.median}, {"p99", cost.p99}, {"max", cost.most}};
   }
   if (!report.soft.empty()) json["soft"] = soft_json(report);
+  for (const SceneStudy& study : report.scenes) json["scenes"].push_back(scene_json(study));
   for (const ExtremeRow& row : report.extremes) json["extremes"].push_back(extreme_json(row));
   if (report.search) json["search"] = search_json(*report.search, report.search_seed);
   if (report.union_search)

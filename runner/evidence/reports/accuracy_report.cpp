@@ -9,6 +9,7 @@
 #include "analysis/report/html_page.h"
 #include "analysis/text.h"
 #include "runner/evidence/accuracy/peers.h"
+#include "runner/evidence/reports/scene_report.h"
 
 namespace palpate::runner::evidence {
 namespace {
@@ -452,6 +453,7 @@ std::vector<analysis::Table> accuracy_tables(const AccuracyReport& report) {
   if (!report.unions.empty()) tables.push_back(union_table(report));
   if (!report.bodies.empty()) tables.push_back(body_table(report));
   if (!report.soft.empty()) tables.push_back(soft_table(report));
+  if (!report.scenes.empty()) tables.push_back(scene_table(report.scenes));
   if (!report.extremes.empty()) tables.push_back(extreme_table(report));
   if (report.search) tables.push_back(search_table(*report.search, report.search_seed));
   if (report.union_search)
@@ -513,6 +515,7 @@ std::string accuracy_page(const AccuracyReport& report) {
     sentences.insert(sentences.begin(), kQuestion);
     analysis::put_list(page.below_title(), sentences);
     page.put_figure_section(accuracy_figure(report), "Error over time");
+    if (!report.scenes.empty()) page.put_figure_section(scene_figure(report.scenes), "Scenes");
   }
   page.begin_section("tables", "The numbers", "Numbers");
   for (const analysis::Table& table : accuracy_tables(report))

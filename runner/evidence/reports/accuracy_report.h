@@ -13,6 +13,7 @@
 #include "runner/evidence/accuracy/paper_first_contact.h"
 #include "runner/evidence/accuracy/study.h"
 #include "runner/evidence/accuracy/union_study.h"
+#include "runner/evidence/scenes/scene_study.h"
 #include "runner/evidence/verification/extreme_cases.h"
 #include "runner/evidence/verification/search.h"
 #include "stimuli/shapes.h"
@@ -42,6 +43,7 @@ struct AccuracyReport {
   std::vector<ExtremeRow> extremes;
   std::vector<BodyRow> bodies;
   evidence::BodyTickCost body_tick;
+  std::vector<SceneStudy> scenes;  ///< of every kind
   std::optional<evidence::SearchCounts> search;
   std::optional<evidence::UnionCounts> union_search;
   std::uint64_t search_seed = 0;  ///< of both searches

@@ -89,7 +89,18 @@ class Results(unittest.TestCase):
     def test_the_page_has_the_figure_and_every_table_and_loads_nothing(self):
         as_xml = re.sub(r"<!DOCTYPE html>|<script>.*?</script>", "", self.page, flags=re.S)
         root = xml.etree.ElementTree.fromstring(as_xml)
-        self.assertEqual(len(root.findall(".//{http://www.w3.org/2000/svg}svg")), 2)  # for wide and narrow screens
+        # Of the shapes and of the scenes, for wide and narrow screens.
+        self.assertEqual(len(root.findall(".//{http://www.w3.org/2000/svg}svg")), 4)
+        scenes = {s["scene"]: s for s in self.result["scenes"]}
+        self.assertEqual(len(scenes), 12)
+        for scene in scenes.values():
+            self.assertIn(scene["scene"], self.page)
+            for row in scene["rows"]:
+                self.assertLessEqual(0, row["median_ns"])
+                self.assertLessEqual(row["median_ns"], row["p99_ns"])
+                self.assertLessEqual(row["p99_ns"], row["worst_ns"])
+        for kind in ("gear", "plate", "scan", "dumbbell", "layer", "tool", "moves", "soft"):
+            self.assertTrue(any(kind in name for name in scenes), kind)
         tables = re.findall(r"(?m)^\S.*\n  (?:triangles|method|shape|case|wrong) ", self.done.stdout)
         self.assertEqual(len(root.findall(".//table")), len(tables))
         self.assertNotRegex(self.page, r"src=|href=\"(?!#|data:)")

@@ -1,0 +1,121 @@
+"""palpate accuracy, stability and render --explain of a user's own scene. Usage: scene_studies_test.py PALPATE"""
+
+import json
+import math
+import unittest
+import xml.etree.ElementTree
+
+from command_case import CommandCase
+
+CUBE = {"objects": [{"shape": "cube", "edge_m": 0.05}]}
+# A block with a valley of 90 degrees along y.
+VALLEY = """v -0.03 -0.03 -0.02
+v 0.03 -0.03 -0.02
+v 0.03 -0.03 0.03
+v 0 -0.03 0
+v -0.03 -0.03 0.03
+v -0.03 0.03 -0.02
+v 0.03 0.03 -0.02
+v 0.03 0.03 0.03
+v 0 0.03 0
+v -0.03 0.03 0.03
+f 1 2 3 4 5
+f 10 9 8 7 6
+f 1 6 7 2
+f 2 7 8 3
+f 3 8 9 4
+f 4 9 10 5
+f 5 10 6 1
+"""
+
+
+def pressed(depth):
+    """The tip comes down into the valley and stays."""
+    lines = ["t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z"]
+    for i in range(300):
+        z = max(0.01 - 1e-4 * i, -depth)
+        lines.append(f"{i / 1000},0,0,{z},0,0,{z + 0.12}")
+    return "\n".join(lines) + "\n"
+
+
+class Accuracy(CommandCase):
+    def study(self, scene, *args):
+        out = self.dir / "a.json"
+        done = self.palpate("accuracy", scene, "--quick", "--json", out, "--force", *args)
+        return json.loads(out.read_text()), done.stdout
+
+    def valley(self):
+        self.file("valley.obj", VALLEY)
+        return self.file("valley.json", {"objects": [{"shape": "mesh", "file": "valley.obj"}]})
+
+    def test_the_law_is_exact_in_a_valley_and_its_hull_is_not(self):
+        path = self.file("p.csv", pressed(0.002))
+        result, text = self.study(self.valley(), "--renderer", "point", "--trajectory", path)
+        rows = {row["method"]: row for row in result["rows"]}
+        self.assertEqual(result["ticks"], 300)
+        self.assertGreater(result["ticks_touching"], 150)
+        self.assertEqual((result["ticks_unknown"], result["truth_inside"]), (0, 0))
+        self.assertLess(rows["law"]["force_error_max_n"], 1e-6)
+        self.assertLess(rows["law"]["tip_error_max_m"], 1e-8)
+        # Over the valley the hull has a lid, 30 mm higher: the tip begins inside it.
+        self.assertGreater(rows["hull"]["force_error_max_n"], 1)
+        self.assertIn('Choose "law"', result["choose"])
+        self.assertIn(result["choose"].split(":")[0], text)
+
+    def test_every_row_has_times_warm_and_cold(self):
+        result, text = self.study(self.file("cube.json", CUBE), "--ticks", 400)
+        for row in result["rows"]:
+            self.assertLess(0, row["median_ns"])
+            self.assertLessEqual(row["median_ns"], row["p99_ns"])
+            self.assertLessEqual(row["p99_ns"], row["worst_ns"])
+            self.assertLess(0, row["cold_median_ns"])
+        law = result["rows"][0]
+        self.assertEqual(law["method"], "law")
+        self.assertLess(law["force_error_max_n"], 1e-5)
+        self.assertLess(law["torque_error_max_nm"], 1e-5)
+        self.assertTrue(any(row["best"] for row in result["rows"]))
+        self.assertIn("Force error", text)
+
+    def test_a_coarser_sphere_is_farther_off(self):
+        scene = self.file("ball.json", {"objects": [{"shape": "sphere", "radius_m": 0.03, "subdivisions": 4}]})
+        rows = {row["method"]: row for row in self.study(scene, "--ticks", 600)[0]["rows"]}
+        error = [rows[name]["force_error_rms_n"] for name in ("law", "law, a quarter", "law, a sixteenth")]
+        self.assertLess(error[0], error[1])
+        self.assertLess(error[1], error[2])
+        self.assertEqual([rows[n]["triangles"] for n in ("law", "law, a quarter")], [5120, 1280])
+
+    def test_layers_add_up(self):
+        scene = self.file("l.json", {"objects": [{"shape": "cube", "edge_m": 0.05, "stiffness_n_per_m": 300, "layers": [
+            {"depth_m": 0.001, "stiffness_n_per_m": 700}]}]})
+        path = self.file("p.csv", "t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n" + "".join(
+            f"{i / 1000},0,0,{0.03 - 1e-4 * i:.6f},0,0,{0.15 - 1e-4 * i:.6f}\n" for i in range(80)))
+        law = self.study(scene, "--renderer", "point", "--trajectory", path)[0]["rows"][0]
+        self.assertGreater(law["ticks_compared"], 20)
+        self.assertLess(law["force_error_max_n"], 1e-6)
+
+    def test_what_moves_or_gives_is_held_against_finer_steps(self):
+        loose = {"objects": [{"shape": "cube", "edge_m": 0.05, "body": {"mass_kg": 1, "damping_per_s": 20}}]}
+        result, _ = self.study(self.file("m.json", loose), "--ticks", 400)
+        self.assertIn("eighth of a tick", result["truth"])
+        self.assertLess(result["rows"][0]["force_error_rms_n"], 0.2)
+        soft = {"objects": [{"shape": "cube", "edge_m": 0.05, "soft": {"young_pa": 20000, "resolution": 3}}]}
+        result, _ = self.study(self.file("s.json", soft), "--ticks", 300)
+        self.assertIn("twice as many elements", result["truth"])
+        self.assertGreater(result["rows"][0]["force_error_rms_n"], 0)
+
+    def test_pictures_and_page(self):
+        figure, page = self.dir / "f.svg", self.dir / "p.html"
+        self.study(self.file("cube.json", CUBE), "--ticks", 200, "--figure", figure, "--report", page)
+        xml.etree.ElementTree.parse(figure)
+        self.assertIn("law: this program", page.read_text())
+
+    def test_options_that_do_not_go_together_are_refused(self):
+        scene = self.file("cube.json", CUBE)
+        self.assertIn("--search", self.palpate("accuracy", scene, "--search", 100, status=2).stderr)
+        self.assertIn("--trajectory", self.palpate("accuracy", "--trajectory", "p.csv", status=2).stderr)
+        self.assertIn("point or ray", self.palpate("accuracy", scene, "--renderer", "line", status=2).stderr)
+        self.palpate("accuracy", self.dir / "none.json", status=2)
+
+
+if __name__ == "__main__":
+    unittest.main()
