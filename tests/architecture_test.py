@@ -71,7 +71,7 @@ MAY_INCLUDE = {
     "runner/evidence/accuracy": BODIES | {"runner/evidence/verification", "rendering/bodies/soft"},
     "runner/evidence/scenes": BODIES | {"protocols", "rendering/bodies/soft", "runner", "runner/evidence", "runner/evidence/accuracy",
                                "runner/evidence/verification", "runner/touch"},
-    "runner/evidence/stability": SERVO | {"protocols", "rendering/bodies", "runner/devices"},
+    "runner/evidence/stability": SERVO | {"protocols", "rendering/bodies", "runner/devices", "runner/evidence/verification", "runner/touch"},
     "runner/evidence/reports": SERVO | {"runner/evidence/accuracy", "runner/evidence/scenes", "runner/evidence/stability", "runner/evidence/verification", "analysis",
                                          "analysis/figures", "analysis/report", "analysis/statistics"},
 }
@@ -150,12 +150,12 @@ PUBLIC = {
     "runner/station": "admission opening protocol_choice run_settings",
     "runner/touch": "forces live_touch scene_notes trial_page",
     "runner/movement": "movement_study touched_trial",
-    "runner/evidence/reports": "accuracy_report scene_report stability_report stability_study",
+    "runner/evidence/reports": "accuracy_report boundary_report scene_report stability_report stability_study",
     "runner/registration": "about_file answers bundle_contents deviations planned_conditions planned_studies registration registration_text sealed_folder",
     "runner/study": "export_settings simulation_limits study_order study_trials task_words",
     "runner/serve": "network served_scene served_session",
     "runner/sweep": "cluster_folder cluster_job slurm swept_study",
-    "runner/evidence/stability": "boundary",
+    "runner/evidence/stability": "boundary scene_boundary",
     "runner/evidence": "tick_meters",
     "runner/commands": "shared/command",
 }

@@ -274,6 +274,9 @@ def examining_lines():
     yield steps("stability --json stability.json --report stability.timed.html --figure stability.svg --jobs 1", timed=True)
     yield steps("accuracy --quick --paths 1 --ticks 20 --most-triangles 400 --json accuracy.json --report accuracy.timed.html"
                 " --figure accuracy.timed.svg --force", timed=True)
+    yield steps("stability protocols/scenes/fig13-two-objects.json --device simulated --json buzz.json --report buzz.html --figure buzz.svg"
+                " --jobs 2 --force")
+    yield refused("stability protocols/scenes/fig13-two-objects.json --device simulated --calibration none.json")
     yield steps("accuracy protocols/scenes/fig13-two-objects.json --quick --renderer ray --json scene.json --report scene.timed.html"
                 " --figure scene.timed.svg --force", timed=True)
     yield steps("accuracy protocols/scenes/fig13-two-objects.json --quick --trajectory protocols/scenes/fig13-two-objects.csv"

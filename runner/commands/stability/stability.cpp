@@ -1,5 +1,7 @@
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
+#include <filesystem>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <optional>
@@ -8,35 +10,118 @@
 #include <vector>
 
 #include "analysis/figures/svg.h"
+#include "data/base/text.h"
+#include "protocols/parse.h"
 #include "runner/commands/shared/command.h"
+#include "runner/devices/device_delay.h"
+#include "runner/devices/registry.h"
+#include "runner/evidence/reports/boundary_report.h"
 #include "runner/evidence/reports/stability_report.h"
 #include "runner/evidence/reports/stability_study.h"
 #include "runner/evidence/stability/boundary.h"
 #include "runner/output/outputs.h"
 #include "runner/output/progress_line.h"
+#include "runner/touch/forces.h"
 
 namespace palpate::runner::commands {
+namespace {
+
+namespace po = boost::program_options;
+
+/// What is known of a device: its nominal damping, and its delay where that was measured.
+evidence::BuzzingDevice device_of(const po::variables_map& values) {
+  const std::string name = values["device"].as<std::string>();
+  const std::string calibration = text_of(values, "calibration");
+  for (const devices::DeviceKind& kind : devices::device_kinds()) {
+    if (name != kind.name) continue;
+    const servo::DeviceCapabilities can = kind.nominal(servo::DeviceConfig());
+    evidence::BuzzingDevice device{.name = name};
+    device.ends.rate = servo::DeviceConfig().rate;
+    // Of the whole device, which holds both ends.
+    device.ends.damping = 0.5 * can.damping;
+    device.ends.friction = 0.5 * can.friction;
+    device.ends.resolution = can.resolution;
+    if (calibration.empty()) return device;
+    for (const devices::ChainTiming& chain :
+         devices::stored_chains(devices::chain_file(calibration))) {
+      if (chain.device != name) continue;
+      device.delay = chain.counted();
+      device.measured = true;
+      constexpr double kMostDelay = 16;  // ticks
+      device.ends.delay =
+          static_cast<int>(std::min(kMostDelay, std::ceil(device.delay * device.ends.rate - 1e-9)));
+    }
+    if (!device.measured) {
+      throw UsageError("--calibration: " + devices::chain_file(calibration) +
+                       " has no delay of this device; make it with palpate devices --timing "
+                       "--device NAME --calibration FILE");
+    }
+    return device;
+  }
+  throw UsageError("no device '" + printable(name) + "'; palpate devices lists them");
+}
+
+/// `palpate stability SCENE.json`.
+void study_users_scene(const po::variables_map& values, output::Outputs& outputs, int jobs) {
+  const std::string path = values["scene"].as<std::string>();
+  const rendering::Renderer& renderer = touch::renderer_named(values["renderer"].as<std::string>());
+  evidence::BoundaryReport report;
+  report.scene = std::filesystem::path(path).filename().string();
+  report.renderer = renderer.name();
+  if (values.count("device")) report.device = device_of(values);
+  const protocols::SceneSpec spec = protocols::parse_scene(path);
+  for (const stimuli::ObjectSpec& object : spec.objects) outputs.protect(object);
+  {
+    output::ProgressLine progress("loops");
+    report.boundary = evidence::scene_boundary(path, spec, renderer,
+                                               report.device ? &report.device->ends : nullptr, jobs,
+                                               [&progress](double done) { progress.show(done); });
+  }
+  outputs.put("json", evidence::boundary_json(report).dump(1) + "\n");
+  if (outputs.wanted("figure")) {
+    outputs.put("figure",
+                analysis::figure_svg(evidence::boundary_figure(report), analysis::light_palette()));
+  }
+  if (outputs.wanted("report")) outputs.put("report", evidence::boundary_page(report));
+  outputs.write();
+  std::cout << evidence::boundary_text(report);
+}
+
+}  // namespace
 
 int stability_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage =
-      "palpate stability [--full] [--report FILE.html] [--json FILE]\n"
+      "palpate stability SCENE.json [--renderer point|ray] [--device NAME [--calibration FILE]]\n"
+      "                 [--report FILE.html] [--figure FILE.svg] [--json FILE]\n"
+      "       palpate stability [--full] [--report FILE.html] [--json FILE]\n"
       "       palpate stability --soft [--seed S] [--figure FILE.svg]";
   line.summary =
       "At what stiffness does a contact become unstable (buzz)? Simulates the closed loop of\n"
-      "hand, two devices and renderer against a wall, an edge, a sphere, two objects and a body\n"
-      "on a wall, and compares the stability boundary with the passivity condition of theory.\n"
+      "hand, two devices and renderer against a wall, an edge, a sphere, two objects, a body on a\n"
+      "wall, a groove, a concave edge, and with a tool, and compares the stability boundary with\n"
+      "the passivity condition of theory. With a scene: the damping that each of its places of\n"
+      "contact needs at 100 Hz to 10 kHz and delays of 0 to 3 ticks, and whether it buzzes on a\n"
+      "device.\n"
       "Status 1 if theory is violated. With --soft: does a tool come to rest on a soft body\n"
       "that is stepped at its own rate? Status 1 if it does not although scenes allow it.";
   line.example =
       "  palpate stability\n"
+      "  palpate stability SCENE.json --device simulated --report buzz.html\n"
       "  palpate stability --soft\n"
       "  palpate stability --full --report stability.html --json stability.json";
   std::string json, page, figure;
   int jobs = 0;
   std::uint64_t seed = 0;
   auto add = line.options.add_options();
-  namespace po = boost::program_options;
+  add("scene", po::value<std::string>()->value_name("FILE"),
+      "scene, JSON; or a mesh file, alone: its own boundary");
+  add("renderer", po::value<std::string>()->value_name("NAME")->default_value("ray"),
+      "of the scene: point or ray");
+  add("device", po::value<std::string>()->value_name("NAME"),
+      "of the scene: whether it buzzes there, by the device's damping");
+  add("calibration", po::value<std::string>()->value_name("FILE"),
+      "with --device: with the delay that `palpate devices --timing` stored beside it");
   add("full", "four stiffnesses a decade instead of one");
   add("soft", "only the map of soft bodies: moduli, springs, rates of the body (a minute)");
   add("seed", po::value(&seed)->value_name("S"),
@@ -47,13 +132,28 @@ int stability_command(const std::vector<std::string>& args) {
   add("json", po::value(&json)->value_name("FILE"), "write every number as JSON");
   add("jobs", po::value(&jobs)->value_name("J"), "threads; default: one for each core");
   add("force", "replace existing files");
+  line.positional.add("scene", 1);
   const auto values = line.parse(args);
   if (!values) return 0;
   if (values->count("jobs") && (jobs < 1 || jobs > 256)) {
     throw UsageError("--jobs: must be 1 to 256, not " + std::to_string(jobs));
   }
-  output::Outputs outputs(*values, {"json", "report", "figure"}, {});
+  output::Outputs outputs(*values, {"json", "report", "figure"}, {"scene", "calibration"});
   if (jobs == 0) jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  if (values->count("scene")) {
+    for (const char* const other : {"full", "soft", "seed"}) {
+      if (values->count(other) > 0)
+        throw UsageError(std::string("--") + other + ": does not go with a scene");
+    }
+    if (values->count("calibration") > 0 && values->count("device") == 0)
+      throw UsageError("--calibration: goes with --device");
+    study_users_scene(*values, outputs, jobs);
+    return 0;
+  }
+  for (const char* const other : {"device", "calibration"}) {
+    if (values->count(other) > 0)
+      throw UsageError(std::string("--") + other + ": goes with a scene");
+  }
   std::optional<output::ProgressLine> progress("loops");
   const evidence::StudyJobs work{jobs, [&](double share) { progress->show(share); },
                                  output::now_ns};

@@ -50,6 +50,18 @@ std::vector<BoundaryCurve> map_curves() {
                 to_string(contact_case), loop));
     }
   }
+  for (const protocols::RendererKind renderer :
+       {protocols::RendererKind::point, protocols::RendererKind::ray}) {
+    const bool point = renderer == protocols::RendererKind::point;
+    for (const ContactCase contact_case : kConcaveCases) {
+      if (point && contact_case == ContactCase::tool) continue;
+      LoopCase loop;
+      loop.contact_case = contact_case;
+      loop.renderer = renderer;
+      out.push_back(curve(point ? "concave, point" : "concave and tools, ray",
+                          to_string(contact_case), loop));
+    }
+  }
   for (const double rate : kRates) {
     LoopCase loop;
     loop.settings.rate = rate;
@@ -82,6 +94,19 @@ std::vector<BoundaryCurve> map_curves() {
     out.push_back(curve("layers and reach, wall",
                         fraction == 1 ? "reach 5 about the tail" : "reach 5 about the middle",
                         far));
+  }
+  // The same where several places carry.
+  for (const ContactCase contact_case : {ContactCase::edge, ContactCase::groove}) {
+    LoopCase with_layer;
+    with_layer.contact_case = contact_case;
+    with_layer.layer_share = 1;
+    out.push_back(curve("layers and reach, others",
+                        std::string("a layer, ") + to_string(contact_case), with_layer));
+    LoopCase far;
+    far.contact_case = contact_case;
+    far.settings.reach = rendering::Reach{.factor = 5, .fraction = 1};
+    out.push_back(
+        curve("layers and reach, others", std::string("reach 5, ") + to_string(contact_case), far));
   }
   struct Device {
     const char* name;

@@ -19,6 +19,7 @@
 #include "runner/devices/simulated.h"
 #include "runner/scene_builder.h"
 #include "runner/servo/passivity.h"
+#include "stimuli/closed_surface.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/inset.h"
 #include "stimuli/polygon_soup.h"
@@ -82,8 +83,45 @@ std::vector<rendering::SceneObject> objects_of(ContactCase contact_case, bool ra
           object(stimuli::cube(2 * kWall), {{0, 0, -kWall - kThick}, {1, 0, 0, 0}}, material, 0),
           object(stimuli::box({0.1, 0.1, kThick}), {{0, 0, -0.5 * kThick}, {1, 0, 0, 0}}, material,
                  1)};
+    case ContactCase::groove: {
+      std::vector<rendering::SceneObject> walls;
+      for (const double side : {-1.0, 1.0}) {
+        const double lean = std::numbers::pi / 3;
+        const Vec3 inward(side * std::sin(lean), 0, -std::cos(lean));
+        walls.push_back(object(stimuli::cube(2 * kWall),
+                               {kWall * inward, turned_about_y(-side * lean)}, material, 0));
+      }
+      return walls;
+    }
+    case ContactCase::tool:
+      return {ridge(0.004, -0.006, material, 0), ridge(0.004, 0.006, material, 1)};
+    case ContactCase::concave_edge:
+      return {};
   }
   throw std::invalid_argument("no such situation");
+}
+
+/// A block with a valley of 90 degrees along y, its bottom at the origin.
+rendering::SceneSurface valley(const stimuli::Material& material) {
+  constexpr double kHalf = 0.03, kDown = 0.02;  // m
+  const std::pair<double, double> corners[] = {
+      {-kHalf, -kDown}, {kHalf, -kDown}, {kHalf, kHalf}, {0, 0}, {-kHalf, kHalf}};
+  constexpr std::uint32_t kCorners = 5;
+  stimuli::PolygonSoup soup;
+  for (const double y : {-kHalf, kHalf}) {
+    for (const auto& [x, z] : corners) soup.vertices.emplace_back(x, y, z);
+  }
+  soup.faces = {{0, 1, 2, 3, 4}, {9, 8, 7, 6, 5}};
+  for (std::uint32_t i = 0; i < kCorners; ++i) {
+    const std::uint32_t next = (i + 1) % kCorners;
+    soup.faces.push_back({i, i + kCorners, next + kCorners, next});
+  }
+  stimuli::Material plain = material;
+  plain.layers.clear();
+  const std::vector<rendering::SurfaceShell> shells = {
+      {std::make_shared<const stimuli::ClosedSurface>(stimuli::closed_surface(soup).surface),
+       Pose{}, plain}};
+  return {std::make_shared<const rendering::Surface>(shells), Pose{}, 0, {}};
 }
 
 /// Adds the layers of materials as further objects.
@@ -108,7 +146,17 @@ std::vector<rendering::SceneObject> with_layers(std::vector<rendering::SceneObje
 rendering::Scene scene_of(ContactCase contact_case, bool ray, const stimuli::Material& material) {
   std::vector<rendering::SceneObject> objects =
       with_layers(objects_of(contact_case, ray, material));
-  if (contact_case != ContactCase::body) return rendering::Scene(std::move(objects), ray);
+  if (contact_case == ContactCase::concave_edge)
+    return rendering::Scene({}, ray, {}, nullptr, {valley(material)});
+  rendering::Tool tool;
+  if (contact_case == ContactCase::tool) {
+    constexpr double kArm = 0.01;  // m
+    tool.segments = {{Vec3(0), Vec3(0, 0, kLength)},
+                     {Vec3(-kArm, 0, 0), Vec3(kArm, 0, 0)},
+                     {Vec3(0, -kArm, 0), Vec3(0, kArm, 0)}};
+  }
+  if (contact_case != ContactCase::body)
+    return rendering::Scene(std::move(objects), ray, std::move(tool));
   constexpr double kMass = 0.01;  // kg
   rendering::MovingObject body{1, {}, objects.back().pose};
   body.body.mass = kMass;
@@ -128,6 +176,11 @@ rendering::LineProbe stylus_at_height_0(ContactCase contact_case, bool ray) {
     const Vec3 tip(0.001, 0.002, 0);
     return {tip, tip + kLength * glm::normalize(Vec3(1, 0, 1))};
   }
+  if (contact_case == ContactCase::groove || contact_case == ContactCase::concave_edge) {
+    const Vec3 tip(0, 0.7e-3, 0);  // it leans along the groove
+    return {tip, tip + kLength * glm::normalize(Vec3(0, 1, 1))};
+  }
+  if (contact_case == ContactCase::tool) return {Vec3(0), Vec3(0, 0, kLength)};
   // It lies across the edge, off-centre, so that the ends carry different forces.
   const double fraction = contact_case == ContactCase::two_objects ? 0.5 : 0.35;
   const Vec3 d(kLength, 0, 0);
@@ -228,7 +281,8 @@ class Loop {
         tail_(s, kReleasedTail),
         controller_({0.5 * s.mass * s.rate}, 1 / s.rate) {
     // Approach from above, so that the renderer finds a first contact.
-    scene.renderer().tick(scene.scene(), state_, lowered(scene.rest(), -5e-3, -5e-3), 1 / s.rate);
+    const double up = -scene.approach();
+    scene.renderer().tick(scene.scene(), state_, lowered(scene.rest(), up, up), 1 / s.rate);
     for (auto& forces : under_way_) forces = {balance_.tip.z, balance_.tail.z};
     const double felt_stiffness = stiffness_ * (s.reach ? stiffness_gain(*s.reach, 0) : 1);
     const double period = std::max(
@@ -486,6 +540,12 @@ const char* to_string(ContactCase contact_case) {
       return "two objects";
     case ContactCase::body:
       return "body on a wall";
+    case ContactCase::groove:
+      return "groove";
+    case ContactCase::concave_edge:
+      return "concave edge";
+    case ContactCase::tool:
+      return "tool across two edges";
   }
   return "";
 }
@@ -494,17 +554,29 @@ LoopScene::LoopScene(ContactCase contact_case, protocols::RendererKind kind,
                      const stimuli::Material& material)
     : renderer_(&renderer_for(kind)),
       scene_(scene_of(contact_case, renderer_->side_contact(), material)) {
-  const rendering::LineProbe start = stylus_at_height_0(contact_case, renderer_->side_contact());
+  // s; slow ticks, in which damping hardly acts. A body needs shorter ones.
+  constexpr double kStep = 1e-6;
+  settle(stylus_at_height_0(contact_case, renderer_->side_contact()),
+         contact_case == ContactCase::body ? 0.05 : 1, kStep);
+}
+
+LoopScene::LoopScene(rendering::Scene scene, const rendering::Renderer& renderer,
+                     const rendering::LineProbe& start)
+    : renderer_(&renderer), scene_(std::move(scene)), approach_(2e-3) {
+  constexpr double kStep = 1e-5;
+  settle(start, scene_.motion() != nullptr ? 1e-3 : 1, kStep);
+}
+
+double LoopScene::stiffness() const { return (force_tip_ + force_tail_) / kDepth; }
+
+/// Lowers the stylus from above to the wanted depth: first contact needs a path from outside.
+void LoopScene::settle(const rendering::LineProbe& start, double slow, double step) {
   rendering::RenderState state = scene_.initial_state();
   rendering::Rendering r;
-  constexpr double kStep = 1e-6;
-  // s; slow ticks, in which damping hardly acts. A body needs shorter ones.
-  const double slow = contact_case == ContactCase::body ? 0.05 : 1;
-  // Lower it from above to the wanted depth: first contact needs a path from outside.
-  for (double down = -2e-3; r.deepest.depth < kDepth; down += kStep) {
+  for (double down = -2e-3; r.deepest.depth < kDepth; down += step) {
     rest_ = lowered(start, down, down);
     r = renderer_->tick(scene_, state, rest_, slow);
-    if (down > 0.05) throw std::logic_error("nothing under the stylus");
+    if (down > 0.05) throw std::runtime_error("nothing under the stylus");
   }
   // A second tick at rest gives the force without damping.
   r = renderer_->tick(scene_, state, rest_, slow);
@@ -568,6 +640,30 @@ BoundaryPoint boundary_at(const LoopCase& loop, double stiffness) {
   }
   point.measured = high;
   return point;
+}
+
+double least_stable_damping(const LoopSettings& settings, const LoopScene& scene, double close) {
+  constexpr double kMost = 1e9;  // N s/m
+  const auto stable = [&](double damping) {
+    LoopSettings with = settings;
+    with.damping = damping;
+    return run_loop(with, scene).stable;
+  };
+  double low = kNoDamping;
+  if (stable(low)) return 0;
+  const double gain = settings.reach ? stiffness_gain(*settings.reach, 0) : 1;
+  double high =
+      std::max(kNoDamping * 2, scene.stiffness() * gain / settings.rate * (0.5 + settings.delay));
+  while (!stable(high)) {
+    low = high;
+    high *= 2;
+    if (high > kMost) return HUGE_VAL;
+  }
+  while (high > close * low) {
+    const double middle = std::sqrt(low * high);
+    (stable(middle) ? high : low) = middle;
+  }
+  return high;
 }
 
 double stiffest_stable(const LoopCase& loop, double damping) {

@@ -43,15 +43,21 @@ struct LoopSettings {
 
 /// The contact that is pressed along -z; each end of the stylus moves along z only.
 enum class ContactCase {
-  wall,         ///< a plane, met by the tip
-  edge,         ///< a cube's edge: the ray lies across it, the point touches a face near it
-  sphere,       ///< met by the tip (point), by the side (ray)
-  two_objects,  ///< the ray lies across two edges; the point is in a groove between two walls
-  body,         ///< a body of 10 g that can move and lies on a plane, met by the tip
+  wall,          ///< a plane, met by the tip
+  edge,          ///< a cube's edge: the ray lies across it, the point touches a face near it
+  sphere,        ///< met by the tip (point), by the side (ray)
+  two_objects,   ///< the ray lies across two edges; the point is in a groove between two walls
+  body,          ///< a body of 10 g that can move and lies on a plane, met by the tip
+  groove,        ///< between two walls of one object, 60 degrees, met by the tip
+  concave_edge,  ///< of a closed surface, 90 degrees, met by the tip
+  tool,          ///< a cross at the tip lies across two edges; with the ray renderer alone
 };
 inline constexpr ContactCase kContactCases[] = {ContactCase::wall, ContactCase::edge,
                                                 ContactCase::sphere, ContactCase::two_objects,
                                                 ContactCase::body};
+/// What is felt by one ideal tool at several places.
+inline constexpr ContactCase kConcaveCases[] = {ContactCase::groove, ContactCase::concave_edge,
+                                                ContactCase::tool};
 const char* to_string(ContactCase contact_case);
 
 /// A scene and the equilibrium of the stylus in it.
@@ -59,6 +65,11 @@ class LoopScene {
  public:
   LoopScene(ContactCase contact_case, protocols::RendererKind renderer,
             const stimuli::Material& material);
+  /// Any scene, turned so that the contact pushes along +z.
+  /// \param start  2 mm below it is a place of contact
+  /// \throws std::runtime_error: there is none within 10 mm
+  LoopScene(rendering::Scene scene, const rendering::Renderer& renderer,
+            const rendering::LineProbe& start);
 
   const rendering::Scene& scene() const { return scene_; }
   const rendering::Renderer& renderer() const { return *renderer_; }
@@ -67,13 +78,19 @@ class LoopScene {
   double force_tip() const { return force_tip_; }
   double force_tail() const { return force_tail_; }
   int contacts() const { return contacts_; }
+  double stiffness() const;  ///< N/m, of the contact along z, at the virtual stylus
+  /// m, above rest: a place from which the way down is free.
+  double approach() const { return approach_; }
 
  private:
+  void settle(const rendering::LineProbe& start, double slow, double step);
+
   const rendering::Renderer* renderer_;
   rendering::Scene scene_;
   rendering::LineProbe rest_;
   double force_tip_ = 0, force_tail_ = 0;
   int contacts_ = 0;
+  double approach_ = 5e-3;
 };
 
 /// Swings are of the contact (its force over its stiffness), peak to peak, m.
@@ -133,6 +150,11 @@ double passive_damping(const LoopCase& loop, double stiffness);
 bool is_stable(const LoopCase& loop, double stiffness, double damping);
 
 BoundaryPoint boundary_at(const LoopCase& loop, double stiffness);
+
+/// N s/m, the smallest damping of each end at which a loop is stable, within `close` (a ratio above
+/// 1); 0: stable without damping; infinity: no damping helps. \param settings  its damping is
+/// ignored
+double least_stable_damping(const LoopSettings& settings, const LoopScene& scene, double close);
 
 /// Largest stiffness, N/m, at most 10^7, up to which all are stable with this damping of each end.
 double stiffest_stable(const LoopCase& loop, double damping);

@@ -117,5 +117,50 @@ class Accuracy(CommandCase):
         self.palpate("accuracy", self.dir / "none.json", status=2)
 
 
+class Stability(CommandCase):
+    def boundary(self, scene, *args):
+        out = self.dir / "b.json"
+        done = self.palpate("stability", scene, "--json", out, "--force", *args)
+        return json.loads(out.read_text()), " ".join(done.stdout.split())
+
+    def test_a_stiffer_faster_or_later_loop_needs_what_theory_says(self):
+        result, text = self.boundary(self.file("cube.json", CUBE), "--renderer", "point")
+        self.assertGreaterEqual(len(result["places"]), 1)
+        for place in result["places"]:
+            self.assertAlmostEqual(place["stiffness_n_per_m"], 800, delta=8)
+            points = {(p["rate_hz"], p["delay_ticks"]): p for p in place["points"]}
+            self.assertEqual(len(points), 7 * 4)
+            self.assertEqual({rate for rate, _ in points}, {100, 200, 500, 1000, 2000, 5000, 10000})
+            for (rate, delay), point in points.items():
+                self.assertAlmostEqual(point["theory_ns_per_m"], place["stiffness_n_per_m"] / rate * (0.5 + delay), places=9)
+                self.assertLessEqual(point["damping_needed_ns_per_m"], 1.03 * point["theory_ns_per_m"])
+            needed = [points[1000, delay]["damping_needed_ns_per_m"] for delay in range(4)]
+            self.assertEqual(needed, sorted(needed))
+            self.assertLess(needed[0], needed[3])
+        self.assertIn("damping", text)
+
+    def test_a_device_is_told_whether_it_buzzes(self):
+        scene = {"objects": [{"shape": "cube", "edge_m": 0.05, "stiffness_n_per_m": 50000}]}
+        result, text = self.boundary(self.file("stiff.json", scene), "--device", "simulated", "--renderer", "point")
+        self.assertIn("the scene buzzes", text)
+        self.assertEqual(result["device"]["name"], "simulated")
+        self.assertTrue(any(place["buzzes_on_device"] for place in result["places"]))
+        _, text = self.boundary(self.file("cube.json", CUBE), "--device", "simulated", "--renderer", "point")
+        self.assertNotIn("the scene buzzes", text)
+
+    def test_options_that_do_not_go_together_are_refused(self):
+        scene = self.file("cube.json", CUBE)
+        self.assertIn("--soft", self.palpate("stability", scene, "--soft", status=2).stderr)
+        self.assertIn("--device", self.palpate("stability", "--device", "simulated", status=2).stderr)
+        self.assertIn("no device", self.palpate("stability", scene, "--device", "none", status=2).stderr)
+        self.assertIn("--calibration", self.palpate("stability", scene, "--calibration", "lab.json", status=2).stderr)
+
+    def test_a_reach_that_no_device_can_show_is_named(self):
+        scene = {"objects": [{"shape": "cube", "edge_m": 0.05, "stiffness_n_per_m": 100000}],
+                 "reach": {"factor": 100, "pivot": "tail"}}
+        told = self.palpate("validate", self.file("reach.json", scene)).stdout
+        self.assertIn("/objects/0 has 100000 N/m (1.9801e+09 N/m at the hand)", told)
+
+
 if __name__ == "__main__":
     unittest.main()
