@@ -110,7 +110,7 @@ PUBLIC = {
     "rendering": "first_contact probe reach render_fault renderer scene tool",
     "rendering/bodies": "moving_scene",
     "runner/evidence/verification": "explain extreme_cases random_solids reference search surface_reference union_cases",
-    "runner/evidence/scenes": "scene_study",
+    "runner/evidence/scenes": "feature_costs scene_study",
     "runner/evidence/accuracy": "body_study methods paper_first_contact peers study union_study",
     "rendering/bodies/soft": "soft_scene",
     "protocols": "answer_keys difference groups json_document parse protocol schedule session_plan sweep_space "

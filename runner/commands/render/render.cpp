@@ -16,6 +16,7 @@
 #include "rendering/bodies/moving_scene.h"
 #include "rendering/bodies/soft/soft_scene.h"
 #include "runner/commands/shared/command.h"
+#include "runner/evidence/scenes/feature_costs.h"
 #include "runner/evidence/verification/explain.h"
 #include "runner/output/outputs.h"
 #include "runner/touch/forces.h"
@@ -41,7 +42,9 @@ struct Explanation {
   std::optional<double> contact_ns, free_ns;  ///< of a whole tick
   std::optional<double> rest_ns;              ///< of contact_ns: not accounted for by the stages
   std::vector<StageCost> stages;
-  std::vector<std::string> notes = {};  ///< on the scene, a sentence each
+  std::vector<std::string> notes = {};               ///< on the scene, a sentence each
+  std::vector<evidence::FeatureTime> features = {};  ///< that the scene has
+  std::vector<evidence::FeatureSaved> saved = {};    ///< that it does not need
 };
 
 Explanation explain_with_costs(const rendering::Scene& scene, const rendering::Renderer& renderer);
@@ -165,6 +168,13 @@ Explanation explain_with_costs(const rendering::Scene& scene, const rendering::R
   };
   explanation.contact_ns = cost(evidence::kTickInContact);
   explanation.free_ns = cost(evidence::kTickInFreeSpace);
+  if (!explanation.contact_ns) {
+    // Made of closed surfaces, or soft.
+    const evidence::WholeTick whole = evidence::time_whole_tick(scene, renderer);
+    explanation.contact_ns = whole.contact_ns;
+    explanation.free_ns = whole.free_ns;
+  }
+  explanation.saved = evidence::features_saved(scene, renderer);
   for (evidence::TickStage& stage : evidence::explain(scene, renderer)) {
     StageCost with{std::move(stage), std::nullopt};
     if (with.stage.runs) with.ns = cost(with.stage.name);
@@ -178,6 +188,30 @@ Explanation explain_with_costs(const rendering::Scene& scene, const rendering::R
     if (share_of_contact(explanation, c)) *explanation.rest_ns -= *c.ns;
   }
   return explanation;
+}
+
+/// What its features cost, and what those that it does not need would.
+std::string features_text(const Explanation& e) {
+  std::string out;
+  const auto put = [&out](const std::string& name, const std::string& number,
+                          const std::string& what) {
+    std::string line = "  " + name;
+    pad(line, 35 - number.size());
+    out += line + number + "  " + what + '\n';
+  };
+  if (!e.features.empty()) out += "\nfeatures of this scene: more ns for a tick in contact\n";
+  for (const evidence::FeatureTime& one : e.features)
+    put(one.name, nanoseconds(one.ns), "than " + one.without);
+  if (e.saved.empty()) return out;
+  out += "\nleft out, because this scene does not need it: instructions saved a tick\n";
+  for (const evidence::FeatureSaved& one : e.saved) {
+    char number[32];
+    std::snprintf(number, sizeof number, "%.0f", one.instructions);
+    put(one.name, number, "");
+    out.erase(out.find_last_not_of(" \n") + 1);
+    out += '\n';
+  }
+  return out + "  " + evidence::kCostsMeasured + '\n';
 }
 
 std::string to_text(const Explanation& e) {
@@ -206,9 +240,10 @@ std::string to_text(const Explanation& e) {
     pad(line, 58);
     out += line + c.stage.why + '\n';
   }
+  out += features_text(e);
   for (const std::string& note : e.notes) out += "\nNote: " + note + ".";
   if (!e.notes.empty()) out += '\n';
-  if (e.rest_ns) {
+  if (e.rest_ns && e.features.empty()) {
     out += "\nThe rest of a tick in contact: " + nanoseconds(e.rest_ns) +
            " ns: writing results, prefetching, tracking other parts.";
   }
@@ -235,6 +270,11 @@ nlohmann::ordered_json to_json(const Explanation& e) {
                       {"ns", figure(c.ns)},
                       {"share_of_contact", figure(share_of_contact(e, c))}});
   }
+  Json features = Json::array(), saved = Json::array();
+  for (const evidence::FeatureTime& one : e.features)
+    features.push_back({{"feature", one.name}, {"than", one.without}, {"more_ns", figure(one.ns)}});
+  for (const evidence::FeatureSaved& one : e.saved)
+    saved.push_back({{"feature", one.name}, {"instructions", one.instructions}});
   return {{"program_version", PALPATE_VERSION},
           {"build", PALPATE_BUILD},
           {"renderer", e.renderer},
@@ -247,6 +287,9 @@ nlohmann::ordered_json to_json(const Explanation& e) {
           {"free_ns", figure(e.free_ns)},
           {"rest_of_contact_ns", figure(e.rest_ns)},
           {"stages", std::move(stages)},
+          {"features", std::move(features)},
+          {"left_out", std::move(saved)},
+          {"left_out_measured", evidence::kCostsMeasured},
           {"notes", e.notes}};
 }
 
@@ -276,6 +319,7 @@ void explain_scene(output::Outputs& outputs, const std::string& path,
   SceneBuilder builder;
   const rendering::Scene scene = touch::build_scene(builder, path, spec, renderer);
   Explanation explanation = explain_with_costs(scene, renderer);
+  explanation.features = evidence::feature_times(path, spec, renderer);
   for (std::size_t i = 0; i < spec.objects.size(); ++i) {
     if (!spec.objects[i].soft)
       add_overlaps(spec.objects[i], "/objects/" + std::to_string(i), builder, explanation.notes);

@@ -162,5 +162,43 @@ class Stability(CommandCase):
         self.assertIn("/objects/0 has 100000 N/m (1.9801e+09 N/m at the hand)", told)
 
 
+class Explain(CommandCase):
+    def explained(self, scene, renderer="ray"):
+        out = self.dir / "e.json"
+        text = self.palpate("render", "--scene", scene, "--renderer", renderer, "--explain", "--json", out, "--force").stdout
+        return json.loads(out.read_text()), text
+
+    def test_every_kind_of_scene_has_times(self):
+        self.file("valley.obj", VALLEY)
+        scenes = {
+            "concave meshes": {"objects": [{"shape": "mesh", "file": "valley.obj"}]},
+            "layers": {"objects": [{"shape": "cube", "edge_m": 0.05, "layers": [{"depth_m": 0.001, "stiffness_n_per_m": 700}]}]},
+            "moving bodies": {"objects": [{"shape": "cube", "edge_m": 0.05, "body": {"mass_kg": 1}}]},
+            "soft bodies": {"objects": [{"shape": "cube", "edge_m": 0.05, "soft": {"young_pa": 20000, "resolution": 3}}]},
+            "tool": {"objects": [{"shape": "cube", "edge_m": 0.05}],
+                     "tool": {"segments": [{"from_m": [0, 0, 0], "to_m": [0, 0, 0.12]}, {"from_m": [0, 0, 0], "to_m": [0.01, 0, 0]}]}}}
+        for feature, scene in scenes.items():
+            with self.subTest(feature):
+                result, text = self.explained(self.file("s.json", scene))
+                self.assertGreater(result["contact_ns"], 0)
+                more = {one["feature"]: one["more_ns"] for one in result["features"]}
+                self.assertTrue(math.isfinite(more[feature]))
+                self.assertIn(feature, text)
+
+    def test_what_is_left_out_is_listed_with_what_it_saved(self):
+        cube = self.file("cube.json", CUBE)
+        result, text = self.explained(cube, "point")
+        saved = {one["feature"]: one["instructions"] for one in result["left_out"]}
+        self.assertEqual(set(saved), {"side contact and torque", "several objects", "unions and tools",
+                                      "closed surfaces", "damping", "friction"})
+        self.assertTrue(all(count > 0 for count in saved.values()))
+        self.assertIn("measured", result["left_out_measured"])
+        self.assertIn(result["left_out_measured"], text)
+        rough = {"objects": [{"shape": "cube", "edge_m": 0.05, "friction_static": 0.3, "friction_dynamic": 0.2}]}
+        result, _ = self.explained(self.file("r.json", rough))
+        self.assertEqual({one["feature"] for one in result["left_out"]},
+                         {"several objects", "unions and tools", "closed surfaces", "damping"})
+
+
 if __name__ == "__main__":
     unittest.main()
