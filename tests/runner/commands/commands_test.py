@@ -357,6 +357,8 @@ class Bench(CommandCase):
         ten = {(r["triangles"], r["parts"]) for r in rows if r["near_parts"] == 10 and r["tool_segments"] == 3}
         self.assertEqual(ten, {(20, 10), (1280, 10), (20480, 10), (327680, 10), (1280, 1000)})
         self.assertIn("Ten near parts and a tool of three segments: median", shown)
+        soft = {(r["elements"], r["state"]) for r in rows if r["mesh"] == "soft cube"}
+        self.assertEqual(soft, {(n ** 3, state) for n in (4, 6, 8) for state in ("contact", "soft_step")})
 
     def test_wrong_numbers_of_ticks_are_refused(self):
         for ticks in (0, -5, "many"):
