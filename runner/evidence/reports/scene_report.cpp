@@ -52,6 +52,10 @@ std::vector<std::string> how_to_read(const SceneStudy& study) {
       "over the ticks that touch. Torque: where no part of the tool lies along a face. Lost: "
       "contacts missed; phantom: found where there is none.");
   all.emplace_back(
+      "Where two places of the ideal tool are right, a method and the exact answer may keep "
+      "different "
+      "ones until the tool has left the object.");
+  all.emplace_back(
       "Times: a whole tick, that touches, on this machine; median and p99 of the quickest of "
       "several "
       "rounds, the worst of all. Cold: the near caches are swept before each tick.");

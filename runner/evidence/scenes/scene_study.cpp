@@ -778,7 +778,7 @@ class Study {
       std::snprintf(
           text, sizeof text,
           "Choose \"%s\": the nearest (rms %.2g N, 99.9 %% within %.2g N), though none is "
-          "within what a device resolves (0.03 mm, here %.2g N); finer meshes are nearer.",
+          "within what a device resolves (0.03 mm, here %.2g N).",
           nearest->method.c_str(), nearest->errors->force_rms, nearest->errors->force_p999, limit);
       out_.choose = text;
     }

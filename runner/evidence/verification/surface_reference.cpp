@@ -285,23 +285,25 @@ bool SurfaceReference::nearest(const Vec3& goal, Vec3& place) {
   return false;
 }
 
-bool SurfaceReference::descend(const Vec3& goal, std::span<const ReferenceSegment> rods, int most) {
+SurfaceReference::Descent SurfaceReference::descend(const Vec3& goal,
+                                                    std::span<const ReferenceSegment> rods,
+                                                    int most) {
   for (int i = 0; i < most; ++i) {
     // Just after a turn the tool may be in the solid by a step: there a valley's faces count beyond
     // their sides.
     collect(rods, i < 4 ? band_ : 2 * skin_);
     Vec3 place;
-    if (!nearest(goal, place)) return false;
+    if (!nearest(goal, place)) return Descent::stuck;
     const Vec3 way = place - tip_;
     const double length = glm::length(way);
     if (length > step_) {
       tip_ += step_ / length * way;
     } else {
       tip_ = place;
-      if (i >= 4 && length <= 1e-12 * size_) return true;
+      if (i >= 4 && length <= 1e-12 * size_) return Descent::ended;
     }
   }
-  return false;
+  return Descent::under_way;
 }
 
 ReferenceTick SurfaceReference::tick(const ReferenceTool& tool) {
@@ -313,10 +315,13 @@ ReferenceTick SurfaceReference::tick(const ReferenceTool& tool) {
   };
   if (!started_ || !left_) {
     left_ = !inside(tool);
+    lost_ = lost_ && !left_;
+    out.known = !lost_;
     tip_ = tool.tip;
     remember();
     return out;
   }
+  const bool touched = touching_;
   const double motion = motion_of(tool.tip, tool.rods, last_tip_, last_rods_);
   const int parts = std::clamp(static_cast<int>(std::ceil(motion / step_)), 1, kMostParts);
   out.known = motion <= step_ * kMostParts;
@@ -334,8 +339,8 @@ ReferenceTick SurfaceReference::tick(const ReferenceTool& tool) {
           mixed(before.from, before.to, grasp_along_) - mixed(after.from, after.to, grasp_along_);
     }
     rods = next;
-    const bool ended = descend(goal, rods, part == parts ? kMostSteps : 12);
-    if (part == parts) out.known = out.known && ended;
+    const Descent descent = descend(goal, rods, part == parts ? kMostSteps : 12);
+    lost_ = lost_ || descent == Descent::stuck || (part == parts && descent != Descent::ended);
     touching_ = !held_.empty();
     double most = 0;
     for (std::size_t i = 0; i < held_.size(); ++i) {
@@ -344,6 +349,13 @@ ReferenceTick SurfaceReference::tick(const ReferenceTool& tool) {
       grasp_rod_ = bounds_[held_[i]].rod;
       grasp_along_ = bounds_[held_[i]].along;
     }
+  }
+  // A contact may only end outside.
+  lost_ = lost_ || !out.known || (touched && !touching_ && inside(tool));
+  if (lost_) {
+    out.known = left_ = touching_ = false;
+    remember();
+    return out;
   }
   out.touching = touching_;
   out.shift = tip_ - tool.tip;

@@ -33,7 +33,8 @@ struct ReferenceTool {
 
 struct ReferenceTick {
   bool touching = false;
-  /// Whether the reference knows the answer: the search ended, and the tool moved little enough.
+  /// Whether the reference knows the answer: the search ended, and the tool moved little enough. A
+  /// tool that jams as it turns has no answer here until it has been outside again.
   bool known = true;
   Vec3 shift{0};   ///< m, from the virtual to the ideal tip
   Vec3 force{0};   ///< N, on the hand
@@ -101,8 +102,13 @@ class SurfaceReference {
                     double beyond);
   void collect_ridge(const Ridge& ridge, const ReferenceSegment& rod, std::size_t index,
                      double beyond);
-  /// Descends towards the virtual tip by at most so many steps. Returns whether it has ended.
-  bool descend(const Vec3& goal, std::span<const ReferenceSegment> rods, int most);
+  enum class Descent {
+    ended,
+    under_way,
+    stuck  ///< nothing is above all bounds: turning jams the tool
+  };
+  /// Descends towards the virtual tip by at most so many steps.
+  Descent descend(const Vec3& goal, std::span<const ReferenceSegment> rods, int most);
   bool nearest(const Vec3& goal, Vec3& place);
 
   std::vector<Face> faces_;
@@ -119,6 +125,7 @@ class SurfaceReference {
   std::size_t grasp_rod_ = 0;
   double grasp_along_ = 0;
   bool started_ = false, left_ = false, touching_ = false;
+  bool lost_ = false;  ///< the answer is unknown until the tool has been outside
 };
 
 }  // namespace palpate::runner::evidence

@@ -38,6 +38,23 @@ def pressed(depth):
     return "\n".join(lines) + "\n"
 
 
+def gear():
+    """Twelve teeth round a bore: a stylus that turns between two of them jams."""
+    n, lines = 48, []
+    for z in (-0.006, 0.006):
+        for outside in (True, False):
+            for i in range(n):
+                radius = (0.03 if i % 4 < 2 else 0.024) if outside else 0.008
+                angle = 2 * math.pi * i / n
+                lines.append(f"v {radius * math.cos(angle)!r} {radius * math.sin(angle)!r} {z}")
+    for i in range(n):
+        j = (i + 1) % n
+        for face in ((i, j, 2 * n + j, 2 * n + i), (n + j, n + i, 3 * n + i, 3 * n + j),
+                     (2 * n + i, 2 * n + j, 3 * n + j, 3 * n + i), (j, i, n + i, n + j)):
+            lines.append("f " + " ".join(str(k + 1) for k in face))
+    return "\n".join(lines) + "\n"
+
+
 class Accuracy(CommandCase):
     def study(self, scene, *args):
         out = self.dir / "a.json"
@@ -61,6 +78,12 @@ class Accuracy(CommandCase):
         self.assertGreater(rows["hull"]["force_error_max_n"], 1)
         self.assertIn('Choose "law"', result["choose"])
         self.assertIn(result["choose"].split(":")[0], text)
+
+    def test_the_exact_tool_is_outside_or_unknown(self):
+        result, _ = self.study(self.file("gear.obj", gear()), "--ticks", 1500)
+        self.assertGreater(result["truth_tried"], 20)
+        self.assertEqual(result["truth_inside"], 0)
+        self.assertLess(result["ticks_unknown"], result["ticks"] / 4)
 
     def test_every_row_has_times_warm_and_cold(self):
         result, text = self.study(self.file("cube.json", CUBE), "--ticks", 400)
