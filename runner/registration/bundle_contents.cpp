@@ -38,11 +38,11 @@ using protocols::FaultList;
 using protocols::ObjectReader;
 using protocols::Presence;
 
-constexpr std::size_t kMostListed = 1'000'000, kMostText = 16'000'000, kMostWord = 10'000;
-constexpr double kMostCount = 1e9;
+constexpr std::size_t kMostListed = 1'000'000, kMostStudyText = 16'000'000, kMostStudyWord = 10'000;
+constexpr double kMostStudyCount = 1e9;
 
 /// What record.json says.
-struct Stated {
+struct StatedStudy {
   analysis::StudyRecord record;
   std::size_t removed = 0;
   std::vector<data::Participant> without_trials;
@@ -52,7 +52,7 @@ void read_texts(ObjectReader& reader, const char* key, std::vector<std::string>&
   const auto* list = reader.array(key, 0, kMostListed, Presence::required);
   for (std::size_t i = 0; list != nullptr && i < list->size(); ++i)
     protocols::read_text((*list)[i], child_pointer(reader.pointer(key), i), out.emplace_back(),
-                         kMostWord, reader.faults());
+                         kMostStudyWord, reader.faults());
 }
 
 /// Elements of a list that is an object each.
@@ -67,18 +67,18 @@ void read_objects(ObjectReader& reader, const char* key,
 }
 
 /// \throws InputError with every fault
-Stated read_record(const std::string& text, const std::string& file) {
+StatedStudy read_record(const std::string& text, const std::string& file) {
   FaultList faults(file);
   const nlohmann::json json = protocols::read_json(text, faults);
   ObjectReader reader(json, "", faults);
-  Stated out;
+  StatedStudy out;
   int version = 1;
   reader.integer("version", version, {1, 1}, Presence::required);
   read_objects(reader, "protocols", [&](ObjectReader& one) {
     analysis::ProtocolText& protocol = out.record.protocols.emplace_back();
-    one.text("name", protocol.name, kMostWord);
+    one.text("name", protocol.name, kMostStudyWord);
     one.checksum("sha256", protocol.sha256);
-    one.text("text", protocol.text, kMostText);
+    one.text("text", protocol.text, kMostStudyText);
     if (one.has("text") && checksum_hex(protocol.text) != protocol.sha256)
       faults.add(one.pointer("sha256"), "expected the SHA-256 of the text, " +
                                             checksum_hex(protocol.text) + ", found " +
@@ -91,12 +91,12 @@ Stated read_record(const std::string& text, const std::string& file) {
   read_texts(reader, "response_devices", out.record.response_devices);
   read_texts(reader, "builds", out.record.builds);
   read_texts(reader, "seeds", out.record.seeds);
-  reader.count("attempts_cut_off", out.record.n_cut_off, {0, kMostCount});
-  reader.count("removed", out.removed, {0, kMostCount});
+  reader.count("attempts_cut_off", out.record.n_cut_off, {0, kMostStudyCount});
+  reader.count("removed", out.removed, {0, kMostStudyCount});
   read_objects(reader, "without_trials", [&](ObjectReader& one) {
     data::Participant& person = out.without_trials.emplace_back();
-    one.text("participant", person.code, kMostWord);
-    one.integer("number", person.enrolled_number, {1, kMostCount}, Presence::required);
+    one.text("participant", person.code, kMostStudyWord);
+    one.integer("number", person.enrolled_number, {1, kMostStudyCount}, Presence::required);
   });
   reader.refuse_unknown_keys();
   faults.throw_if_any();
@@ -181,7 +181,7 @@ study::ShownTrial shown_trial(const TrialFields& of, std::size_t row, int sessio
 }
 
 /// The study as the check compares it, from the trials and record.json.
-StudyData study_of(const TextTable& table, const TrialFields& of, const Stated& stated) {
+StudyData study_of(const TextTable& table, const TrialFields& of, const StatedStudy& stated) {
   StudyData out;
   for (const analysis::ProtocolText& one : stated.record.protocols)
     out.protocols.push_back({one.name, one.text, one.sha256});
@@ -214,7 +214,7 @@ StudyData study_of(const TextTable& table, const TrialFields& of, const Stated& 
   return out;
 }
 
-void put_without_trials(const Stated& stated, StudyData& study) {
+void put_without_trials(const StatedStudy& stated, StudyData& study) {
   std::int64_t id = -1;
   for (const data::Participant& person : stated.without_trials) {
     study.runs.emplace_back().participant = person;
@@ -484,7 +484,7 @@ BundleFacts bundle_facts(const std::string& folder, const std::vector<CheckPoint
   out.format = fs::is_directory(fs::path(folder) / "data/bids") ? "bids" : "psych-ds";
   const std::string trials = (fs::path(folder) / kTrials).string();
   out.trials = read_text_table(trials);
-  const Stated stated =
+  const StatedStudy stated =
       read_record(read_member(folder, kRecord), (fs::path(folder) / kRecord).string());
   out.record = stated.record;
   const TrialFields fields(out.trials, trials);

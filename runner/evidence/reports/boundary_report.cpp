@@ -78,7 +78,7 @@ std::vector<std::string> sentences_of(const BoundaryReport& report) {
   return all;
 }
 
-std::vector<std::string> how_to_read() {
+std::vector<std::string> how_to_read_boundaries() {
   return {
       "Damping needed: of each end of the stylus, by simulating the loop of two ends (0.1 kg, no "
       "hand), devices and renderer at the place, 1 mm deep. Less, and a swing of 0.1 mm does not "
@@ -112,7 +112,7 @@ std::string boundary_text(const BoundaryReport& report) {
   if (report.boundary.places.empty()) return out.str();
   for (const BuzzingPlace& place : report.boundary.places) put_table(out, table_of(place));
   out << "\nHow to read it\n";
-  for (const std::string& sentence : how_to_read()) put_wrapped(out, sentence);
+  for (const std::string& sentence : how_to_read_boundaries()) put_wrapped(out, sentence);
   return out.str();
 }
 
@@ -219,7 +219,7 @@ std::string boundary_page(const BoundaryReport& report) {
     analysis::put_table(page.body(), table_of(place));
   page.end_section();
   page.begin_section("reading", "How to read it", "How to read it");
-  analysis::put_list(page.body(), how_to_read());
+  analysis::put_list(page.body(), how_to_read_boundaries());
   page.end_section();
   return page.html("palpate " PALPATE_VERSION ".");
 }
