@@ -125,6 +125,20 @@ class Accuracy(CommandCase):
         result, _ = self.study(self.file("s.json", soft), "--ticks", 300)
         self.assertIn("twice as many elements", result["truth"])
         self.assertGreater(result["rows"][0]["force_error_rms_n"], 0)
+        # Twice as many elements a side would not step in time: times alone.
+        soft["objects"][0]["soft"]["resolution"] = 8
+        result, _ = self.study(self.file("s.json", soft), "--ticks", 100)
+        self.assertEqual(result["truth"], "none")
+        self.assertIsNone(result["rows"][0]["force_error_rms_n"])
+        self.assertGreater(result["rows"][0]["median_ns"], 0)
+        self.assertTrue(any("finer scene is refused" in note for note in result["notes"]))
+
+    def test_as_near_the_quicker_one_is_chosen(self):
+        ball = {"shape": "sphere", "radius_m": 0.02, "subdivisions": 3}
+        result, _ = self.study(self.file("b.json", {"objects": [ball]}), "--renderer", "point", "--ticks", 500)
+        least = min(row["force_error_rms_n"] for row in result["rows"])
+        near = [row for row in result["rows"] if row["force_error_rms_n"] <= 1.05 * least]
+        self.assertIn(f'Choose "{min(near, key=lambda row: row["median_ns"])["method"]}"', result["choose"])
 
     def test_pictures_and_page(self):
         figure, page = self.dir / "f.svg", self.dir / "p.html"
