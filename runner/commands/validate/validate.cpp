@@ -14,13 +14,13 @@
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/texts.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/validate/protocol_check.h"
 #include "runner/devices/device_delay.h"
 #include "runner/devices/registry.h"
 #include "runner/devices/simulated.h"
 #include "runner/serve/served_scene.h"
 #include "runner/session/device_check.h"
 #include "runner/session/simulated_study.h"
+#include "runner/station/protocol_check.h"
 #include "runner/study/task_words.h"
 #include "runner/touch/forces.h"
 #include "runner/touch/scene_notes.h"
@@ -127,7 +127,7 @@ void print_task_summary(const protocols::Protocol& protocol, std::ostream& out) 
   const std::vector<std::string> typed = study::keyboard_parts(protocol);
   if (!typed.empty())
     out << "  keyboard    needed beside a device's buttons for " << list(typed) << "\n";
-  const Duration duration = duration_of(protocol);
+  const station::Duration duration = station::duration_of(protocol);
   out << "  trials      at most " << trials << " for each participant\n  duration    about "
       << time_in_words(duration.usual) << ", at most " << time_in_words(duration.longest)
       << "; breaks and pages besides\n"
@@ -145,7 +145,7 @@ void print_summary(const protocols::Protocol& protocol, std::ostream& out) {
     renderers.emplace_back(protocols::to_string(kind));
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli) stimuli.push_back(stimulus.name);
   constexpr std::array kOrders = {"in this order", "counterbalanced", "interleaved"};
-  const Duration duration = duration_of(protocol);
+  const station::Duration duration = station::duration_of(protocol);
   const double trial = duration.usual / static_cast<double>(trials.size()) - protocol.home.rest;
 
   out << protocol.name << (protocol.title.empty() ? "" : ": " + printable(protocol.title)) << "\n"
@@ -179,13 +179,13 @@ void print_verdict(const std::string& what, const std::vector<std::string>& reas
 void print_fitness(const protocols::Protocol& protocol, const StimulusLibrary& library,
                    const std::vector<devices::ChainTiming>& measured, std::ostream& out) {
   out << "  can be shown by (run --device NAME)\n";
-  for (const Verdict& verdict : device_verdicts(protocol, library, measured)) {
+  for (const station::Verdict& verdict : station::device_verdicts(protocol, library, measured)) {
     print_verdict(verdict.name, verdict.reasons, verdict.limited, out);
     if (verdict.chain)
       out << "      with its delay of " << verdict.chain->counted() * 1e3
           << " ms from pose to force, measured " << printable(verdict.chain->made_utc) << "\n";
   }
-  const Verdict simulated = simulation_verdict(protocol, library);
+  const station::Verdict simulated = station::simulation_verdict(protocol, library);
   out << "  can be tried with simulated participants\n";
   print_verdict(simulated.name, simulated.reasons, simulated.limited, out);
 }
@@ -210,15 +210,15 @@ void add_buzzing(const stimuli::ObjectSpec& object, const std::string& place,
 }
 
 /// Which devices can show the materials of a scene, through its tool and reach, or why not.
-std::vector<Verdict> scene_verdicts(const protocols::SceneSpec& spec) {
+std::vector<station::Verdict> scene_verdicts(const protocols::SceneSpec& spec) {
   const protocols::Protocol shown =
       serve::protocol_of(spec, renderer_for(protocols::RendererKind::ray));
-  std::vector<Verdict> out;
-  const servo::DeviceConfig config = device_config(shown);
+  std::vector<station::Verdict> out;
+  const servo::DeviceConfig config = station::device_config(shown);
   for (const devices::DeviceKind& kind : devices::device_kinds()) {
     const servo::DeviceCapabilities can = kind.nominal(config);
     if (can.actuated_freedom == 0) continue;
-    Verdict& verdict = out.emplace_back();
+    station::Verdict& verdict = out.emplace_back();
     verdict.name = kind.name;
     for (std::size_t i = 0; i < spec.objects.size(); ++i)
       add_buzzing(spec.objects[i], "/objects/" + std::to_string(i), shown, can, verdict.reasons);
@@ -233,11 +233,11 @@ std::string json_line(const nlohmann::ordered_json& json) {
 /// \param notes  what there is to say of its objects
 std::string scene_json(const std::string& path, const protocols::SceneSpec& spec,
                        const std::vector<std::string>& notes) {
-  nlohmann::ordered_json out = faults_json(path, {});
+  nlohmann::ordered_json out = station::faults_json(path, {});
   out["summary"] = {{"kind", "scene"}, {"objects", spec.objects.size()}};
   out["notes"] = notes;
   out["devices"] = nlohmann::ordered_json::array();
-  for (const Verdict& verdict : scene_verdicts(spec)) {
+  for (const station::Verdict& verdict : scene_verdicts(spec)) {
     nlohmann::ordered_json& one = out["devices"].emplace_back();
     one = {{"name", verdict.name},
            {"can", verdict.reasons.empty()},
@@ -274,7 +274,7 @@ void validate_scene(const std::string& text, const std::string& path, bool json,
   for (std::size_t i = 0; i < spec.objects.size(); ++i)
     print_overlaps(spec.objects[i], "/objects/" + std::to_string(i), builder, out);
   out << "  materials can be shown by (explore, serve --device NAME)\n";
-  for (const Verdict& verdict : scene_verdicts(spec))
+  for (const station::Verdict& verdict : scene_verdicts(spec))
     print_verdict(verdict.name, verdict.reasons, {}, out);
   out << "  touch it    palpate explore " << printable(shell_quoted(path)) << "\n";
 }
@@ -365,7 +365,7 @@ void validate_file(const ValidateRequest& request, std::ostream& out) {
   if (!request.json) return print_protocol(protocol, std::move(builder), request.measured, out);
   const std::vector<std::string> notes = notes_on(protocol, builder);
   const StimulusLibrary library(protocol, std::move(builder));
-  out << json_line(protocol_json(file, protocol, library, request.measured, notes));
+  out << json_line(station::protocol_json(file, protocol, library, request.measured, notes));
 }
 
 }  // namespace
@@ -418,7 +418,7 @@ int validate_command(const std::vector<std::string>& args) {
   } catch (const stimuli::MeshError& error) {
     for (const std::string& fault : error.faults()) faults.push_back({file, "", fault});
   }
-  std::cout << json_line(faults_json(file, faults));
+  std::cout << json_line(station::faults_json(file, faults));
   return 2;
 }
 

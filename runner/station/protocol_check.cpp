@@ -1,4 +1,4 @@
-#include "runner/commands/validate/protocol_check.h"
+#include "runner/station/protocol_check.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -11,9 +11,8 @@
 #include "runner/devices/simulated.h"
 #include "runner/participants/simulated_settings.h"
 #include "runner/session/simulated_study.h"
-#include "runner/study/task_words.h"
 
-namespace palpate::runner::commands {
+namespace palpate::runner::station {
 namespace {
 
 using Json = nlohmann::ordered_json;
@@ -261,4 +260,4 @@ Json protocol_json(const std::string& file, const protocols::Protocol& protocol,
   return out;
 }
 
-}  // namespace palpate::runner::commands
+}  // namespace palpate::runner::station

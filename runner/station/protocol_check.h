@@ -14,7 +14,7 @@
 #include "runner/servo/device.h"
 #include "runner/session/device_check.h"
 
-namespace palpate::runner::commands {
+namespace palpate::runner::station {
 
 /// Whether a device, or the simulated participants with theirs, can show a protocol.
 struct Verdict {
@@ -59,4 +59,4 @@ nlohmann::ordered_json protocol_json(const std::string& file, const protocols::P
                                      const std::vector<devices::ChainTiming>& measured,
                                      const std::vector<std::string>& notes);
 
-}  // namespace palpate::runner::commands
+}  // namespace palpate::runner::station
