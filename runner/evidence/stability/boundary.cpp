@@ -94,7 +94,7 @@ std::vector<rendering::SceneObject> objects_of(ContactCase contact_case, bool ra
       return walls;
     }
     case ContactCase::tool:
-      return {ridge(0.004, -0.006, material, 0), ridge(0.004, 0.006, material, 1)};
+      return {ridge(0.004, -0.006, material, 0), ridge(0.004, 0.006, material, 0)};  // one object
     case ContactCase::concave_edge:
       return {};
   }

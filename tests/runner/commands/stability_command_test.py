@@ -52,6 +52,9 @@ class Stability(unittest.TestCase):
                   if c["panel"].startswith("scenes")}
         self.assertEqual(scenes, {(s, r) for s in ("wall", "edge", "sphere", "two objects", "body on a wall")
                                   for r in ("point", "ray")})
+        concave = {(c["loop"]["scene"], c["loop"]["renderer"]) for c in result["curves"] if c["panel"].startswith("concave")}
+        self.assertEqual(concave, {("groove", "point"), ("groove", "ray"), ("concave edge", "point"), ("concave edge", "ray"),
+                                   ("tool across two edges", "ray")})
         for renderer in ("point", "ray"):
             self.check_a_held_body(result, renderer)
         self.check_theory(result["theory"] + result["curves"])
@@ -93,7 +96,8 @@ class Stability(unittest.TestCase):
         """Computed again, for the effective stiffness: of surface and layer together. With a reach of 5, one end moves
         the virtual tip by its lever, the other by one less in the opposite direction."""
         felt = {"a layer as stiff as the surface": 2, "reach 5 about the tail": 5**2 + 4**2,
-                "reach 5 about the middle": 3**2 + 2**2}
+                "reach 5 about the middle": 3**2 + 2**2, "a layer, edge": 2, "a layer, groove": 2,
+                "reach 5, edge": 5**2 + 4**2, "reach 5, groove": 5**2 + 4**2}
         self.assertLessEqual(set(felt), {curve["name"] for curve in curves})
         for curve in curves:
             loop = curve["loop"]
@@ -104,7 +108,9 @@ class Stability(unittest.TestCase):
         extras = {curve["name"]: (curve["loop"]["layer_stiffness_of_surface"], curve["loop"]["reach"])
                   for curve in curves}
         self.assertEqual({name: extra for name, extra in extras.items() if extra != (0, None)},
-                         {"a layer as stiff as the surface": (1, None),
+                         {"a layer as stiff as the surface": (1, None), "a layer, edge": (1, None), "a layer, groove": (1, None),
+                          "reach 5, edge": (0, {"factor": 5, "pivot_share_of_stylus": 1}),
+                          "reach 5, groove": (0, {"factor": 5, "pivot_share_of_stylus": 1}),
                           "reach 5 about the tail": (0, {"factor": 5, "pivot_share_of_stylus": 1}),
                           "reach 5 about the middle": (0, {"factor": 5, "pivot_share_of_stylus": 0.5})})
 
