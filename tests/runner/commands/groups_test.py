@@ -167,8 +167,8 @@ class Groups(command_case.CommandCase):
         protocol = self.file("p.json", SMALL | {"blocks": [stairs], "groups": {"names": ["young", "old"], "patch": {"old": {"blocks": [slower]}}}})
         db = self.simulated(protocol, "--participants", 2)
         found = self.analyzed("--db", db)
-        targets = {one["participant_id"]: one["tracks"][0]["procedure"]["target"] for one in found["cells"][0]["participants"]
-                   if one["tracks"]}
+        targets = {one["participant_id"]: one["tracks"][0]["procedure"]["converges_at"]
+                   for one in found["cells"][0]["psychometric_functions"]}
         self.assertAlmostEqual(targets["S001"], 0.5 ** (1 / 2), places=3)
         self.assertAlmostEqual(targets["S002"], 0.5 ** (1 / 3), places=3)
 
