@@ -101,7 +101,7 @@ class Results(unittest.TestCase):
                 self.assertLessEqual(row["p99_ns"], row["worst_ns"])
         for kind in ("gear", "plate", "scan", "dumbbell", "layer", "tool", "moves", "soft"):
             self.assertTrue(any(kind in name for name in scenes), kind)
-        tables = re.findall(r"(?m)^\S.*\n  (?:triangles|method|shape|case|wrong) ", self.done.stdout)
+        tables = re.findall(r"(?m)^\S.*\n  (?:triangles|method|shape|case|wrong|scene) ", self.done.stdout)
         self.assertEqual(len(root.findall(".//table")), len(tables))
         self.assertNotRegex(self.page, r"src=|href=\"(?!#|data:)")
         self.assertIn("default-src 'none'; script-src 'sha256-", self.page)
