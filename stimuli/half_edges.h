@@ -55,9 +55,9 @@ enum class Pieces { one, any };
 /// coordinates are unusable.
 HalfEdges link_half_edges(const PolygonSoup& soup, MeshFaults& faults, Pieces pieces = Pieces::one);
 
-/// A hash table from pairs of indices to an index, in two flat arrays: a mesh of a million triangles
-/// has two million edges, and a node for each would cost more than the rest of its construction.
-/// Open addressing with linear probing; keys are unordered pairs. Grows by itself.
+/// A hash table from pairs of indices to an index, in two flat arrays: a mesh of a million
+/// triangles has two million edges, and a node for each would cost more than the rest of its
+/// construction. Open addressing with linear probing; keys are unordered pairs. Grows by itself.
 class PairMap {
  public:
   static constexpr std::uint32_t kNone = 0xffffffff;
