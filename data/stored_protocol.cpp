@@ -52,6 +52,20 @@ void read_columns(const nlohmann::json& page, std::vector<StoredColumn>& to) {
   }
 }
 
+void read_factors(const nlohmann::json& protocol, std::vector<StoredFactor>& to) {
+  for (const auto& one : list_of(protocol, "factors")) {
+    StoredFactor factor;
+    read_text(one, "name", factor.name);
+    for (const auto& level : list_of(one, "levels")) {
+      std::string name;
+      read_text(level, "name", name);
+      if (!name.empty() && level.contains("set"))
+        factor.levels.emplace_back(name, level["set"].dump());
+    }
+    if (!factor.name.empty()) to.push_back(std::move(factor));
+  }
+}
+
 GroupAssignment read_groups(const nlohmann::json& protocol) {
   using Rule = GroupAssignment::Rule;
   GroupAssignment out;
@@ -93,6 +107,7 @@ StoredProtocol read_stored_protocol(const std::string& text) {
   }
   for (const auto& page : list_of(json, "pages")) read_columns(page, out.columns);
   out.groups = read_groups(json);
+  read_factors(json, out.factors);
   std::vector<std::string> renderers;
   read_texts(json, "renderers", renderers);
   for (const auto& one : list_of(json, "blocks")) {

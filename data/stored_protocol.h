@@ -4,6 +4,7 @@
 // type, keeps its default.
 
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "data/base/group_assignment.h"
@@ -24,6 +25,12 @@ struct StoredColumn {
   std::vector<std::string> choices;  ///< empty: any text or number
 };
 
+/// What is varied within participants besides renderer, stimulus and level.
+struct StoredFactor {
+  std::string name;
+  std::vector<std::pair<std::string, std::string>> levels;  ///< name, JSON of what it sets
+};
+
 struct StoredProtocol {
   std::string name, title;            ///< "": none
   std::string seed;                   ///< of the trial orders, as written; "": none
@@ -32,6 +39,7 @@ struct StoredProtocol {
   std::vector<StoredBlock> blocks;    ///< empty: version 1
   std::vector<StoredColumn> columns;  ///< of participants
   GroupAssignment groups;             ///< of participants
+  std::vector<StoredFactor> factors;  ///< empty: none
 };
 
 StoredProtocol read_stored_protocol(const std::string& text);

@@ -12,6 +12,7 @@
 #include "data/base/checksum.h"
 #include "data/base/text.h"
 #include "protocols/answer_keys.h"
+#include "protocols/factors.h"
 #include "protocols/groups.h"
 #include "protocols/json_document.h"
 #include "protocols/parse_scene.h"
@@ -149,24 +150,6 @@ void read_renderers(ObjectReader& reader, Protocol& protocol) {
   }
 }
 
-StimulusSpec read_stimulus(ObjectReader& reader, const Protocol& protocol, const MeshFiles& files) {
-  StimulusSpec stimulus;
-  reader.name("name", stimulus.name);
-  stimuli::Material material = protocol.material;
-  reader.section("material", [&](ObjectReader& section) {
-    read_material(section, material);
-    for (const char* key : {"stiffness_n_per_m", "damping_ns_per_m", "friction_static",
-                            "friction_dynamic", "layers"}) {
-      if (section.has(key) && reader.has(key)) {
-        reader.faults().add(reader.pointer(key), "expected in 'material' or here, found in both");
-      }
-    }
-  });
-  stimulus.object = read_object(reader, material, files);
-  reader.refuse_unknown_keys();
-  return stimulus;
-}
-
 void read_stimuli(ObjectReader& reader, Protocol& protocol, const MeshFiles& files) {
   const json* const list = reader.array("stimuli", 1, kMaxStimuli, Presence::required);
   if (list == nullptr) return;
@@ -174,7 +157,8 @@ void read_stimuli(ObjectReader& reader, Protocol& protocol, const MeshFiles& fil
   for (std::size_t i = 0; i < list->size(); ++i) {
     const std::string pointer = child_pointer(reader.pointer("stimuli"), i);
     ObjectReader item((*list)[i], pointer, reader.faults());
-    protocol.stimuli.push_back(read_stimulus(item, protocol, files));
+    protocol.stimuli.push_back(read_stimulus(item, protocol.material, files));
+    protocol.stimuli.back().place = i;
     if (protocol.version == 2) protocol.stimulus_texts.push_back((*list)[i].dump());
     const std::string& name = protocol.stimuli.back().name;
     if (!name.empty() && !names.insert(name).second) {
@@ -293,6 +277,7 @@ void read_identification(ObjectReader& reader, Protocol& protocol) {
 
 /// Version 2: blocks of tasks, and pages.
 void read_tasks(ObjectReader& reader, Protocol& protocol, const MeshFiles& files) {
+  read_factors(reader, protocol);
   read_blocks(reader, protocol);
   read_pages(reader, protocol, files);
   read_periphery(reader, protocol);
@@ -407,6 +392,7 @@ Protocol read_design(const json& root, const MeshFiles& files, FaultList& faults
   reader.seed("seed", protocol.seed);
   reader.refuse_unknown_keys();
   protocol.groups.seed = protocol.seed;
+  if (faults.empty()) add_cells(root, files, protocol, faults);
   if (faults.empty()) (protocol.version == 2 ? check_blocks : check_schedule)(protocol, faults);
   return protocol;
 }

@@ -520,6 +520,25 @@ stimuli::ObjectSpec read_object(ObjectReader& reader, const stimuli::Material& d
   return spec;
 }
 
+StimulusSpec read_stimulus(ObjectReader& reader, const stimuli::Material& default_material,
+                           const MeshFiles& files) {
+  StimulusSpec stimulus;
+  reader.name("name", stimulus.name);
+  stimuli::Material material = default_material;
+  reader.section("material", [&](ObjectReader& section) {
+    read_material(section, material);
+    for (const char* key : {"stiffness_n_per_m", "damping_ns_per_m", "friction_static",
+                            "friction_dynamic", "layers"}) {
+      if (section.has(key) && reader.has(key)) {
+        reader.faults().add(reader.pointer(key), "expected in 'material' or here, found in both");
+      }
+    }
+  });
+  stimulus.object = read_object(reader, material, files);
+  reader.refuse_unknown_keys();
+  return stimulus;
+}
+
 std::string folder_of(const std::string& file) {
   return std::filesystem::path(file).parent_path().string();
 }

@@ -55,6 +55,10 @@ struct MeshFiles {
 stimuli::ObjectSpec read_object(ObjectReader& reader, const stimuli::Material& default_material,
                                 const MeshFiles& files);
 
+/// Reads a stimulus of a protocol: a name, and an object with a material of its own.
+StimulusSpec read_stimulus(ObjectReader& reader, const stimuli::Material& default_material,
+                           const MeshFiles& files);
+
 /// Reads stiffness_n_per_m, damping_ns_per_m, friction_static, friction_dynamic and layers.
 void read_material(ObjectReader& reader, stimuli::Material& material);
 

@@ -9,6 +9,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "data/base/group_assignment.h"
@@ -75,8 +76,30 @@ enum class BlockOrder {
   shapes  ///< the study of shapes: schedule.h, through all sessions; nothing but its keys is shown
 };
 
+/// A level of a factor: what it sets.
+struct FactorLevel {
+  std::string name;
+  /// JSON pointer ("/stimuli/*/friction_static", "/block/time_out_s") and the value's JSON text.
+  std::vector<std::pair<std::string, std::string>> sets;
+};
+/// What is varied within participants besides renderer, stimulus and level.
+struct Factor {
+  std::string name;
+  std::vector<FactorLevel> levels;
+};
+/// The levels of a factor that a block crosses with its other factors: indices.
+struct CrossedFactor {
+  std::size_t factor = 0;  ///< into Protocol::factors
+  std::vector<std::size_t> levels;
+};
+
 struct TaskBlock {
-  std::string name;  ///< unique within the protocol; "": of the study of shapes
+  /// Unique within the protocol, except among the cells of a block; "": of the study of shapes.
+  std::string name;
+  std::size_t place = 0;  ///< in the protocol's list, where the cells of a block are one
+  std::vector<CrossedFactor> factors{};
+  bool cells_apart = false;         ///< one after the other; else every trial may be of any cell
+  std::optional<std::size_t> cell;  ///< of the factors, apart from the other cells
   BlockOrder order = BlockOrder::own;
   TaskKind task = TaskKind::identify;
   int session = 1;
@@ -90,6 +113,8 @@ struct TaskBlock {
   std::optional<int> standard;
   std::optional<RendererKind> standard_renderer;  ///< of the standard; none: the trial's
   std::optional<int> absent;  ///< detect: shown in catch trials; none: nothing at all
+  /// Of a stimulus in a cell: `standard` and `absent` in the same cell.
+  std::map<int, int> standard_of{}, absent_of{};
   std::optional<LevelTarget> level;
   std::vector<ProcedureSpec> procedures;  ///< tracks for each stimulus and renderer; none: no level
   /// Of each stimulus and renderer, without procedure; external: trials of the block.
@@ -218,8 +243,9 @@ struct Sounds {
 };
 
 struct StimulusSpec {
-  std::string name;            ///< unique within the protocol
+  std::string name;            ///< unique within the protocol; in a cell: data/base/cell_name.h
   stimuli::ObjectSpec object;  ///< material already resolved against the protocol's default
+  std::size_t place = 0;       ///< in the protocol's list; in a cell: of the plain stimulus
 };
 
 struct Protocol {
@@ -308,6 +334,7 @@ struct Protocol {
   bool blocks_counterbalanced = false;  ///< within a session; practice stays before its block
   std::vector<PageSpec> pages;
   std::vector<std::string> stimulus_texts;  ///< JSON of each stimulus, for its levels
+  std::vector<Factor> factors;              ///< crossed by blocks; each cell has its own stimuli
   GroupAssignment groups;                   ///< of participants
   /// The protocol of each group, with what differs for it (groups.h). Empty: there are no groups,
   /// or this is a group's own.

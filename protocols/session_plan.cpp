@@ -70,7 +70,8 @@ void SessionPlan::begin_sequence() {
   std::vector<ProcedureSpec> specs;
   for (const BlockTrack& track : tracks_of(block())) specs.push_back(*track.procedure);
   tracks_.emplace(
-      specs, task_stream(protocol_->seed, participant_number_, block_index(), kTaskTracks).next());
+      specs,
+      task_stream(protocol_->seed, participant_number_, stream_of(block()), kTaskTracks).next());
 }
 
 void SessionPlan::begin_shapes() {
@@ -116,7 +117,7 @@ Trial SessionPlan::adaptive_trial() const {
   Trial trial;
   trial.stimulus = track.stimulus;
   trial.renderer = track.renderer;
-  trial.track = static_cast<int>(wanted.track) + 1;
+  trial.track = first_track(block()) + static_cast<int>(wanted.track);
   trial.level = wanted.level;
   const DrawnTrial drawn = drawn_trial(*protocol_, participant_number_, sequence().block, shown_);
   trial.catch_trial = drawn.catch_trial;

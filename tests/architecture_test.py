@@ -113,10 +113,10 @@ PUBLIC = {
     "runner/evidence/scenes": "feature_costs scene_study",
     "runner/evidence/accuracy": "body_study methods paper_first_contact peers study union_study",
     "rendering/bodies/soft": "soft_scene",
-    "protocols": "answer_keys difference groups json_document parse protocol schedule session_plan sweep_space "
+    "protocols": "answer_keys difference factors groups json_document parse protocol schedule session_plan sweep_space "
                  "tasks/block_order tasks/block_procedures tasks/levels tasks/texts",
     "protocols/procedures": "procedure procedure_spec psychometric",
-    "data/base": "checksum group_assignment input_file json_text markdown random text",
+    "data/base": "cell_name checksum group_assignment input_file json_text markdown random text",
     "data": "column_table record stored_protocol sweep_record",
     "data/files": "atomic_file atomic_folder file_permissions text_sink output_check utc",
     "data/store": "export_log participant_columns participant_groups protocol_rows schema connection station_database store sweep_file "
@@ -127,7 +127,7 @@ PUBLIC = {
     "analysis/input": "csv_reader trials study_record study_table sweep_table",
     "analysis/statistics": "analysis comparison conclusions describe group_power group_simulation interval_coverage jobs mixed_model "
                            "paired paired_evidence pattern power plan quantiles sensitivity "
-                           "study_groups sweep_analysis task_analysis threshold_plan",
+                           "study_design sweep_analysis task_analysis threshold_plan",
     "analysis/movement": "comparison measures pictures",
     "analysis/figures": "panel_drawing figures svg",
     "analysis/report": "coverage_report html_page hypotheses plan_record plan_report report study_report tables",

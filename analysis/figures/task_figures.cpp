@@ -237,7 +237,7 @@ std::string difference_sentence(const TaskGroupComparison& one) {
          counted(one.n, "participant", "participants") + "). ";
 }
 
-void add_group_figures(const StudyAnalysis& analysis, std::vector<Figure>& figures) {
+void add_design_figures(const StudyAnalysis& analysis, std::vector<Figure>& figures) {
   const auto same = [](const auto& a, const auto& b) {
     return a.task == b.task && a.block_name == b.block_name && a.shape == b.shape;
   };
@@ -662,7 +662,7 @@ Figure figure_of(const StudyAnalysis& analysis, const TaskCell& cell, std::strin
 
 std::vector<Figure> task_figures(const StudyAnalysis& analysis) {
   std::vector<Figure> figures;
-  add_group_figures(analysis, figures);
+  add_design_figures(analysis, figures);
   add_rating_figures(analysis, figures);
   add_magnitude_figures(analysis, figures);
   std::size_t number = 0;

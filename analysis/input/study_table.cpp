@@ -15,6 +15,7 @@
 #include "analysis/input/study_record.h"
 #include "analysis/input/trials.h"
 #include "analysis/text.h"
+#include "data/base/cell_name.h"
 #include "data/base/json_text.h"
 #include "data/base/text.h"
 #include "data/files/text_sink.h"
@@ -133,7 +134,7 @@ class TaskRow {
 bool success_of(TaskRow& row, StudyTrial& trial) {
   const bool known = row.has("correct");
   if (trial.task == "identify") {
-    trial.success = trial.response == trial.shape;
+    trial.success = trial.response == base_name(trial.shape);
   } else if (trial.task == "detect") {
     trial.success = trial.response == "yes";
   } else if (trial.response == "same" || trial.response == "different") {
@@ -165,7 +166,24 @@ int intervals_of(const TaskRow& row) {
   return static_cast<int>(std::count(onsets.begin(), onsets.end(), ';')) + 1;
 }
 
-StudyTrial read_trial(TaskRow& row) {
+/// Columns of factors stand after `practice`: of a table with them, those that have no other
+/// meaning.
+std::vector<std::string> factor_columns(const Columns& columns) {
+  const auto practice = columns.find("practice");
+  if (practice == columns.end()) return {};
+  std::map<std::size_t, std::string> after;
+  for (const auto& [name, place] : columns) {
+    if (place > practice->second) after.emplace(place, name);
+  }
+  std::vector<std::string> out;
+  for (const auto& [place, name] : after) {
+    if (name == "timed_out" || name == "onset_utc") return out;
+    out.push_back(name);
+  }
+  return {};
+}
+
+StudyTrial read_trial(TaskRow& row, const std::vector<std::string>& factors) {
   StudyTrial trial;
   trial.participant = row.text("participant_id");
   trial.task = row.value("task");
@@ -173,7 +191,11 @@ StudyTrial read_trial(TaskRow& row) {
   trial.block_name = row.text("block_name");
   trial.track = row.text("track");
   trial.renderer = row.text("renderer");
-  trial.shape = row.text("shape");
+  CellName cell{std::string(row.text("shape"))};
+  for (const std::string& factor : factors) {
+    if (!row.value(factor).empty()) cell.levels.emplace_back(factor, row.value(factor));
+  }
+  trial.shape = cell.text();
   trial.response = trial.task == "identify" ? row.text("response") : row.value("response");
   trial.level = row.number("level");
   trial.standard_level = row.number("standard_level");
@@ -228,7 +250,7 @@ void order_trials(std::vector<StudyTrial>& trials) {
 /// "NA" is no answer unless a stimulus has that name.
 void drop_missing_answers(std::vector<StudyTrial>& trials) {
   std::set<std::string> shapes;
-  for (const StudyTrial& trial : trials) shapes.insert(trial.shape);
+  for (const StudyTrial& trial : trials) shapes.insert(base_name(trial.shape));
   for (StudyTrial& trial : trials) {
     if (trial.task != "identify" || !is_missing(trial.response) || shapes.contains(trial.response))
       continue;
@@ -244,6 +266,37 @@ void put_protocol(const std::string& sha256, const std::string& text, const std:
   const bool used = std::ranges::any_of(table.protocols,
                                         [&](const auto& known) { return known.second == sha256; });
   if (used && table.title.empty()) table.title = data::read_stored_protocol(text).title;
+}
+
+/// Adds factors with their levels, each once.
+void note_factors(const std::vector<data::StoredFactor>& more, StudyTable& table) {
+  for (const data::StoredFactor& factor : more) {
+    StudyFactor* known = nullptr;
+    for (StudyFactor& one : table.factors) {
+      if (one.name == factor.name) known = &one;
+    }
+    if (known == nullptr) known = &table.factors.emplace_back(StudyFactor{factor.name, {}});
+    for (const auto& [level, sets] : factor.levels) note_once(level, known->levels);
+  }
+}
+
+/// Adds the factors of the trials that no protocol described, levels by name.
+void note_factors_of_trials(StudyTable& table) {
+  std::vector<data::StoredFactor> found;
+  std::set<std::pair<std::string, std::string>> levels;
+  for (const StudyTrial& trial : table.trials) {
+    for (const auto& one : cell_name(trial.shape).levels) levels.insert(one);
+    for (const auto& [factor, level] : cell_name(trial.shape).levels) {
+      if (std::ranges::find(found, factor, &data::StoredFactor::name) == found.end())
+        found.push_back({factor, {}});
+    }
+  }
+  for (data::StoredFactor& factor : found) {
+    for (const auto& [name, level] : levels) {
+      if (name == factor.name) factor.levels.emplace_back(level, "");
+    }
+  }
+  note_factors(found, table);
 }
 
 void warn_of_alike_names(StudyTable& table) {
@@ -291,6 +344,7 @@ StudyTable read_tasks_csv(const std::string& path, const std::vector<std::string
   CsvReader reader(path);
   std::vector<std::string> found, twice;
   const Columns columns = read_header(reader, &twice);
+  const std::vector<std::string> factors = factor_columns(columns);
   const std::size_t n_fields = reader.fields().size();
   faults.reserve(twice.size());
   for (const std::string& name : twice)
@@ -331,7 +385,7 @@ StudyTable read_tasks_csv(const std::string& path, const std::vector<std::string
       ++table.n_practice;
       continue;
     }
-    table.trials.push_back(read_trial(row));
+    table.trials.push_back(read_trial(row, factors));
     StudyTrial& trial = table.trials.back();
     trial.simulated = simulated;
     if (!row.value("group").empty()) {
@@ -364,12 +418,14 @@ StudyTable read_tasks_csv(const std::string& path, const std::vector<std::string
   for (const ProtocolText& one : protocols) put_protocol(one.sha256, one.text, path, table);
   std::vector<std::string> groups;
   for (const ProtocolText& one : protocols) {
-    for (const std::string& name : data::read_stored_protocol(one.text).groups.names)
-      note_once(name, groups);
+    const data::StoredProtocol stored = data::read_stored_protocol(one.text);
+    for (const std::string& name : stored.groups.names) note_once(name, groups);
+    note_factors(stored.factors, table);
   }
   label_groups(groups, table);
   if (numbered) order_trials(table.trials);
   drop_missing_answers(table.trials);
+  note_factors_of_trials(table);
   warn_of_alike_names(table);
   torque.warn(table.warnings);
   return table;
@@ -425,8 +481,9 @@ StudyTable read_tasks_store(data::Store& store, const std::string& protocol) {
   for (const data::ProtocolInfo& one : store.protocols()) {
     if (!is_protocol(protocol, one.name, one.sha256)) continue;
     put_protocol(one.sha256, one.text, path, table);
-    for (const std::string& name : data::read_stored_protocol(one.text).groups.names)
-      note_once(name, group_names);
+    const data::StoredProtocol stored = data::read_stored_protocol(one.text);
+    for (const std::string& name : stored.groups.names) note_once(name, group_names);
+    note_factors(stored.factors, table);
   }
   table.people = data::participant_columns(store);
   std::set<std::string> shown;
@@ -440,6 +497,7 @@ StudyTable read_tasks_store(data::Store& store, const std::string& protocol) {
         {{path, "trials",
           "expected at least one completed trial that is not practice" +
               (protocol.empty() ? "" : " of the protocol " + printable(protocol))}});
+  note_factors_of_trials(table);
   warn_of_alike_names(table);
   label_groups(group_names, table);
   torque.warn(table.warnings);

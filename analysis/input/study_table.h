@@ -23,6 +23,12 @@ struct GroupLabels {
   const std::string& add(const std::string& participant, const std::string& group);
 };
 
+/// What is varied within participants besides renderer, stimulus and level.
+struct StudyFactor {
+  std::string name;
+  std::vector<std::string> levels;  ///< in the protocol's order
+};
+
 /// The trials of a study. One of shapes alone has only `times`.
 struct StudyTable {
   std::string source;              ///< path as the user gave it
@@ -36,6 +42,7 @@ struct StudyTable {
   std::string title;           ///< of the study, from its protocol; "": unknown
   std::vector<std::string> warnings;
   GroupLabels group_labels;
+  std::vector<StudyFactor> factors;  ///< crossed; a trial's cell is in the name of its stimulus
   /// Answers that describe the participants of these trials; from databases only.
   std::vector<data::ParticipantColumn> people;
   /// Their protocols: name and SHA-256, each once.

@@ -6,7 +6,7 @@
 #include <string>
 #include <variant>
 
-#include "analysis/report/between_report.h"
+#include "analysis/report/design_report.h"
 #include "analysis/report/report.h"
 #include "analysis/report/task_tables.h"
 #include "analysis/statistics/paired_evidence.h"
@@ -582,7 +582,7 @@ std::string task_report_json(const StudyAnalysis& analysis, const std::string& p
   for (const TaskGroupComparison& one : analysis.group_models.comparisons)
     out["group_comparisons"].push_back(group_comparison_json(one));
   out.update(named_json(analysis));
-  put_groups(analysis.between_groups, out);
+  put_design(analysis.table, analysis.by_design, out);
   if (analysis.identification)
     out["identification"] = read_ordered_json(report_json(*analysis.identification));
   return out.dump(1, ' ', false, TaskJson::error_handler_t::replace) + "\n";

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "analysis/figures/figures.h"
-#include "analysis/report/between_report.h"
+#include "analysis/report/design_report.h"
 #include "analysis/report/html_page.h"
 #include "analysis/report/report.h"
 #include "analysis/report/task_tables.h"
@@ -136,10 +136,10 @@ class TaskPage {
   }
 
   void put_groups() {
-    if (analysis_.between_groups.empty()) return;
+    if (analysis_.by_design.empty()) return;
     page_.begin_section("groups", "Groups of participants", "Groups");
     for (const Figure& figure : between_figures(analysis_)) page_.put_figure(figure);
-    for (const Table& table : groups_tables(analysis_.between_groups, label_))
+    for (const Table& table : design_tables(analysis_.by_design, label_))
       put_table(page_.body(), table);
     page_.end_section();
   }

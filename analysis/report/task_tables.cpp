@@ -7,7 +7,7 @@
 #include <utility>
 #include <variant>
 
-#include "analysis/report/between_report.h"
+#include "analysis/report/design_report.h"
 #include "analysis/statistics/conclusions.h"
 #include "analysis/statistics/paired_evidence.h"
 #include "analysis/text.h"
@@ -620,7 +620,7 @@ bool has_model(const StudyAnalysis& analysis, const TaskComparison& one) {
 }
 
 std::string headline(const StudyAnalysis& analysis) {
-  const std::string groups = groups_conclusion(analysis.between_groups);
+  const std::string groups = design_conclusion(analysis.by_design);
   return groups.empty() ? conclusion(analysis) : groups + " " + conclusion(analysis);
 }
 

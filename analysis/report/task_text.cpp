@@ -3,7 +3,7 @@
 #include <string>
 #include <variant>
 
-#include "analysis/report/between_report.h"
+#include "analysis/report/design_report.h"
 #include "analysis/report/report.h"
 #include "analysis/report/task_tables.h"
 #include "analysis/statistics/task_analysis.h"
@@ -351,7 +351,7 @@ std::string task_report_text(const StudyAnalysis& analysis) {
   if (!analysis.table.warnings.empty()) text += "\n";
   for (const TaskCell& cell : analysis.cells) text += cell_text(cell);
   for (const TaskGroup& group : analysis.groups) text += group_text(group);
-  text += groups_text(analysis.between_groups);
+  text += design_text(analysis.by_design);
   text += group_detection_text(analysis) + group_model_text(analysis);
   for (const TaskComparison& one : analysis.renderers) text += comparison_text(one, true);
   for (const TaskComparison& one : analysis.conditions) text += comparison_text(one, false);

@@ -14,28 +14,22 @@ namespace bm = boost::math;
 
 double quantile_975(double df) { return quantile(bm::students_t(df), 0.975); }
 
-double mean_of_cells(const GroupedRow& row, std::size_t first, std::size_t count) {
-  double sum = 0;
-  for (std::size_t i = first; i < first + count; ++i) sum += row.values[i];
-  return sum / static_cast<double>(count);
-}
-
 /// What of a participant is compared.
 struct Compared {
-  std::optional<std::size_t> condition;  ///< none: the mean over all cells
+  std::optional<DesignCondition> condition;  ///< none: the mean over all cells
   bool of_difference = false;
 };
 
-/// Values of a group's participants. \param conditions  levels of the first factor
+/// Values of a group's participants.
 std::vector<double> compared_values(const std::vector<GroupedRow>& rows, std::size_t group,
-                                    const Compared& what, std::size_t conditions) {
+                                    const Compared& what, const std::vector<WithinFactor>& within) {
   std::vector<double> out;
   for (const GroupedRow& row : rows) {
     if (row.group != group) continue;
-    const std::size_t cells = row.values.size(), of_one = cells / conditions;
-    double value = what.condition ? mean_of_cells(row, *what.condition * of_one, of_one)
-                                  : mean_of_cells(row, 0, cells);
-    if (what.of_difference) value -= mean_of_cells(row, 0, of_one);
+    double value =
+        what.condition ? mean_of_condition(row.values, within, *what.condition) : mean(row.values);
+    if (what.of_difference)
+      value -= mean_of_condition(row.values, within, {what.condition->factor, 0});
     out.push_back(value);
   }
   return out;
@@ -55,11 +49,35 @@ GroupMarginal marginal(const std::vector<double>& values) {
   return out;
 }
 
-void adjust_contrasts(std::vector<GroupContrast>& contrasts) {
+/// Adjusts the p of the contrasts from `first` on.
+void adjust_contrasts(std::vector<GroupContrast>& contrasts, std::size_t first) {
   std::vector<std::optional<double>> p;
-  for (const GroupContrast& one : contrasts) p.push_back(one.p);
+  for (std::size_t i = first; i < contrasts.size(); ++i) p.push_back(contrasts[i].p);
   const auto adjusted = holm(p);
-  for (std::size_t i = 0; i < contrasts.size(); ++i) contrasts[i].p_holm = adjusted[i];
+  for (std::size_t i = first; i < contrasts.size(); ++i) contrasts[i].p_holm = adjusted[i - first];
+}
+
+/// One-sample t of the participants' differences.
+GroupContrast paired_contrast(const std::vector<double>& differences) {
+  GroupContrast out;
+  out.within = out.of_difference = true;
+  out.n_reference = out.n = differences.size();
+  const GroupMarginal found = marginal(differences);
+  out.estimate = found.mean;
+  if (!found.mean || !found.se) {
+    out.undefined = "fewer than two participants with a value in every cell";
+    return out;
+  }
+  if (*found.se <= kNoVariance * std::max(1.0, std::fabs(*found.mean))) {
+    out.undefined = "all participants of a group are equal (no variance)";
+    return out;
+  }
+  out.se = found.se;
+  out.ci95 = found.ci95;
+  out.df = static_cast<double>(differences.size()) - 1;
+  out.t = *out.estimate / *out.se;
+  out.p = 2 * cdf(complement(bm::students_t(*out.df), std::fabs(*out.t)));
+  return out;
 }
 
 }  // namespace
@@ -97,8 +115,22 @@ GroupContrast welch(const std::vector<double>& reference, const std::vector<doub
   return out;
 }
 
+double mean_of_condition(const std::vector<double>& cells, const std::vector<WithinFactor>& within,
+                         const DesignCondition& condition) {
+  std::size_t inner = 1;  // cells from one level of the factor to the next
+  for (std::size_t f = condition.factor + 1; f < within.size(); ++f) inner *= within[f].levels;
+  double sum = 0;
+  std::size_t n = 0;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    if (i / inner % within[condition.factor].levels != condition.level) continue;
+    sum += cells[i];
+    ++n;
+  }
+  return sum / static_cast<double>(n);
+}
+
 BetweenGroups compare_groups(const std::vector<GroupedFigures>& figures, std::size_t groups,
-                             const std::vector<WithinFactor>& within) {
+                             const std::vector<WithinFactor>& within, WithinContrasts contrasts) {
   BetweenGroups out;
   std::vector<GroupedRow> rows;
   for (std::size_t i = 0; i < figures.size(); ++i) {
@@ -112,29 +144,45 @@ BetweenGroups compare_groups(const std::vector<GroupedFigures>& figures, std::si
       out.dropped.push_back(i);
   }
   out.anova = mixed_anova(rows, groups, within);
-  const std::size_t conditions = within.empty() ? 1 : within.front().levels;
-  std::vector<Compared> compared{{}};
-  for (std::size_t c = 0; conditions > 1 && c < conditions; ++c) compared.push_back({c, false});
+  std::vector<Compared> compared{{}}, differences;
+  // Shapes are described by themselves: one table for each would hide the design.
+  const std::size_t shown = contrasts == WithinContrasts::added ? within.size() : 1;
+  for (std::size_t f = 0; f < std::min(shown, within.size()); ++f) {
+    if (within[f].levels < 2) continue;
+    for (std::size_t level = 0; level < within[f].levels; ++level) {
+      compared.push_back({DesignCondition{f, level}, false});
+      if (level > 0) differences.push_back({DesignCondition{f, level}, true});
+    }
+  }
   for (std::size_t group = 0; group < groups; ++group) {
     for (const Compared& one : compared) {
       GroupMarginal& made =
-          out.marginals.emplace_back(marginal(compared_values(rows, group, one, conditions)));
+          out.marginals.emplace_back(marginal(compared_values(rows, group, one, within)));
       made.group = group;
       made.condition = one.condition;
     }
   }
-  for (std::size_t c = 1; c < conditions; ++c) compared.push_back({c, true});
+  compared.insert(compared.end(), differences.begin(), differences.end());
   for (std::size_t group = 1; group < groups; ++group) {
     for (const Compared& one : compared) {
-      GroupContrast& made =
-          out.contrasts.emplace_back(welch(compared_values(rows, 0, one, conditions),
-                                           compared_values(rows, group, one, conditions)));
+      GroupContrast& made = out.contrasts.emplace_back(
+          welch(compared_values(rows, 0, one, within), compared_values(rows, group, one, within)));
       made.group = group;
       made.condition = one.condition;
       made.of_difference = one.of_difference;
     }
   }
-  adjust_contrasts(out.contrasts);
+  adjust_contrasts(out.contrasts, 0);
+  const std::size_t first = out.contrasts.size();
+  for (std::size_t group = 0; contrasts == WithinContrasts::added && group < groups; ++group) {
+    for (const Compared& one : differences) {
+      GroupContrast& made =
+          out.contrasts.emplace_back(paired_contrast(compared_values(rows, group, one, within)));
+      made.group = group;
+      made.condition = one.condition;
+    }
+  }
+  adjust_contrasts(out.contrasts, first);
   return out;
 }
 

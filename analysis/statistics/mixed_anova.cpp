@@ -101,11 +101,11 @@ MixedAnova mixed_anova(const std::vector<GroupedRow>& rows, std::size_t groups,
   MixedAnova out;
   out.n.assign(groups, 0);
   for (const GroupedRow& row : rows) ++out.n[row.group];
-  if (groups < 2) out.undefined = "only one group";
   if (std::ranges::find(out.n, std::size_t{0}) != out.n.end())
     out.undefined = "a group has no participant with a value in every cell";
   else if (rows.size() <= groups)
-    out.undefined = "one participant in each group, so no variance within groups";
+    out.undefined = groups < 2 ? "one participant, so no variance"
+                               : "one participant in each group, so no variance within groups";
   if (!out.undefined.empty()) return out;
 
   VectorXd n(static_cast<Index>(groups));
@@ -125,7 +125,7 @@ MixedAnova mixed_anova(const std::vector<GroupedRow>& rows, std::size_t groups,
                                       between, all_error));
     };
     if (!name.empty()) add(name, unweighted);
-    add(name.empty() ? "group" : "group:" + name, helmert_contrasts(n.size()));
+    if (groups > 1) add(name.empty() ? "group" : "group:" + name, helmert_contrasts(n.size()));
   }
   return out;
 }

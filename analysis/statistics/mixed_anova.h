@@ -1,6 +1,6 @@
 #pragma once
-// Analysis of variance with one factor between participants (the group) and any number within them,
-// on one value per participant and cell. Type III: effects are of unweighted means, so groups of
+// Analysis of variance with one factor between participants (the group), or none, and any number
+// within them, on one value per participant and cell. Type III: effects are of unweighted means, so groups of
 // unequal size do not shift those within participants. As R's afex::aov_car(type = 3).
 
 #include <cstddef>
@@ -39,7 +39,7 @@ struct MixedAnova {
   std::vector<GroupEffect> effects;  ///< "group", then each within effect and its product
 };
 
-/// \param groups  number of groups
+/// \param groups  number of groups; 1: no factor between participants
 MixedAnova mixed_anova(const std::vector<GroupedRow>& rows, std::size_t groups,
                        const std::vector<WithinFactor>& within);
 

@@ -14,6 +14,7 @@
 #include <variant>
 
 #include "analysis/statistics/describe.h"
+#include "data/base/cell_name.h"
 
 namespace palpate::analysis {
 namespace {
@@ -531,13 +532,13 @@ InformationTransfer transfer_of(const Trials& trials) {
   std::map<std::string, std::size_t> stimuli, answers;
   for (const StudyTrial* trial : trials) {
     if (!trial->answered) continue;
-    stimuli.emplace(trial->shape, stimuli.size());
+    stimuli.emplace(base_name(trial->shape), stimuli.size());
     answers.emplace(trial->response, answers.size());
   }
   std::vector<std::vector<std::size_t>> counts(stimuli.size(),
                                                std::vector<std::size_t>(answers.size(), 0));
   for (const StudyTrial* trial : trials) {
-    if (trial->answered) ++counts[stimuli[trial->shape]][answers[trial->response]];
+    if (trial->answered) ++counts[stimuli[base_name(trial->shape)]][answers[trial->response]];
   }
   return information_transfer(counts);
 }
@@ -553,7 +554,7 @@ void add_information(TaskCell& cell, const Trials& trials) {
   std::set<std::string> stimuli, answers;
   for (const StudyTrial* trial : trials) {
     if (!trial->answered) continue;
-    stimuli.insert(trial->shape);
+    stimuli.insert(base_name(trial->shape));
     answers.insert(trial->response);
   }
   const std::size_t fewest = std::min(stimuli.size(), answers.size());
@@ -777,7 +778,7 @@ StudyAnalysis analyze_study(StudyTable table, const FunctionSettings& functions,
   identify_times(result.table);
   if (auto times = std::exchange(result.table.times, std::nullopt))
     result.identification = analyze(std::move(*times), settings, program_version);
-  result.between_groups = between_groups(result);
+  result.by_design = measures_by_design(result);
   return result;
 }
 

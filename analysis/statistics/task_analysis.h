@@ -14,7 +14,7 @@
 #include "analysis/statistics/paired.h"
 #include "analysis/statistics/psychometric_fit.h"
 #include "analysis/statistics/ratings.h"
-#include "analysis/statistics/study_groups.h"
+#include "analysis/statistics/study_design.h"
 #include "analysis/statistics/task_comparisons.h"
 #include "analysis/statistics/task_group.h"
 #include "analysis/statistics/transformed_means.h"
@@ -220,7 +220,7 @@ struct StudyAnalysis {
   std::vector<TaskGroup> groups;
   std::vector<TaskComparison> renderers, conditions;
   TaskGroupResults group_models;
-  std::vector<GroupedMeasure> between_groups;  ///< empty: the study has no groups
+  std::vector<GroupedMeasure> by_design;  ///< empty: the study has neither groups nor factors
   /// Times and accuracy of identification, over all its blocks; none: no identification.
   std::optional<Analysis> identification;
 };

@@ -11,6 +11,7 @@
 
 #include "analysis/statistics/describe.h"
 #include "analysis/statistics/task_analysis.h"
+#include "data/base/cell_name.h"
 
 namespace palpate::analysis {
 namespace {
@@ -367,6 +368,9 @@ void compare_rated_stimuli(const std::vector<const TaskCell*>& cells,
   }
 }
 
+/// Cells of crossed factors are compared by their effects (study_design.h).
+bool is_in_cell(const TaskCell& cell) { return !cell_name(cell.shape).levels.empty(); }
+
 }  // namespace
 
 ThresholdComparison compare_thresholds(const std::vector<ParticipantFigure>& figures,
@@ -441,11 +445,12 @@ std::vector<TaskComparison> compare_renderers(const std::vector<TaskCell>& cells
 }
 
 std::vector<TaskComparison> compare_conditions(const std::vector<TaskCell>& cells) {
-  using Key = std::tuple<std::string, std::string, std::optional<double>>;
+  using Key = std::tuple<std::string, std::string, std::optional<double>, bool>;
   std::vector<TaskComparison> results;
   for (const auto& group : groups_of<Key>(cells, [](const TaskCell& c) {
-         return Key{c.task, c.renderer, c.standard_level};
+         return Key{c.task, c.renderer, c.standard_level, is_in_cell(c)};
        })) {
+    if (is_in_cell(*group.front())) continue;
     for (const Measure& measure : measures()) {
       if (std::string(measure.name) == kRating) continue;  // another block has another question
       auto one = compared(group, measure, [](const TaskCell& cell) {
@@ -459,8 +464,9 @@ std::vector<TaskComparison> compare_conditions(const std::vector<TaskCell>& cell
   using Block = std::tuple<std::string, std::string, std::string>;
   for (const auto& group : groups_of<Block>(cells, [](const TaskCell& c) {
          return Block{c.task, c.renderer, c.block_name};
-       }))
-    compare_rated_stimuli(group, results);
+       })) {
+    if (!is_in_cell(*group.front())) compare_rated_stimuli(group, results);
+  }
   adjust_ratings(results);
   return results;
 }

@@ -1,10 +1,10 @@
 #include "data/export/clock.h"
 
+#include <algorithm>
 #include <limits>
 #include <regex>
 
 #include "data/files/utc.h"
-#include "data/stored_protocol.h"
 
 namespace palpate::data {
 namespace {
@@ -19,10 +19,30 @@ std::int64_t difference(std::int64_t a, std::int64_t b) {
                : std::numeric_limits<std::int64_t>::max();
 }
 
+/// The factors of all protocols, each once, with the levels of all.
+std::vector<StoredFactor> factors_of(Store& store) {
+  std::vector<StoredFactor> out;
+  for (const ProtocolInfo& protocol : store.protocols()) {
+    for (const StoredFactor& factor : read_stored_protocol(protocol.text).factors) {
+      auto known = std::ranges::find(out, factor.name, &StoredFactor::name);
+      if (known == out.end()) known = out.insert(out.end(), {factor.name, {}});
+      for (const auto& level : factor.levels) {
+        const auto same = [&](const auto& one) { return one.first == level.first; };
+        if (std::ranges::none_of(known->levels, same)) known->levels.push_back(level);
+      }
+    }
+  }
+  return out;
+}
+
 }  // namespace
 
 ExportClock::ExportClock(Store& store, Times times)
-    : times_(times), tasks_(have_blocks(store.protocols())), torque_(store), groups_(store) {
+    : times_(times),
+      tasks_(have_blocks(store.protocols())),
+      torque_(store),
+      groups_(store),
+      factors_(factors_of(store)) {
   if (relative()) firsts_ = store.first_onsets();
 }
 

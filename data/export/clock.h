@@ -6,11 +6,13 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "data/export/settings.h"
 #include "data/store/participant_groups.h"
 #include "data/store/store.h"
 #include "data/store/task_text.h"
+#include "data/stored_protocol.h"
 
 namespace palpate::data {
 
@@ -26,6 +28,9 @@ class ExportClock {
 
   /// Rows of participants have the column group if any protocol has groups.
   const ParticipantGroups& groups() const { return groups_; }
+
+  /// Rows of trials have a column for each factor of a protocol.
+  const std::vector<StoredFactor>& factors() const { return factors_; }
 
   Times times() const { return times_; }
   bool relative() const { return times_ == Times::relative; }
@@ -44,6 +49,7 @@ class ExportClock {
   bool tasks_ = false;
   TorqueNotes torque_;
   ParticipantGroups groups_;
+  std::vector<StoredFactor> factors_;
   std::map<std::string, std::int64_t, std::less<>> firsts_;  // code -> ns since 1970
 };
 

@@ -1,9 +1,12 @@
 #include "data/export/delimited_row.h"
 
 #include <algorithm>
-#include <array>
 #include <charconv>
+#include <map>
+#include <mutex>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <tuple>
 
 #include "data/base/json_text.h"
 #include "data/files/text_sink.h"
@@ -304,6 +307,57 @@ std::vector<Column> made_relative(std::vector<Column> columns) {
   return columns;
 }
 
+/// A column's texts, which live as long as the program.
+const char* kept(const std::string& text) {
+  static std::set<std::string> texts;
+  static std::mutex mutex;
+  const std::lock_guard lock(mutex);
+  return texts.insert(text).first->c_str();
+}
+
+Column column_of(const StoredFactor& factor) {
+  Column out{kept(factor.name), "Level of a factor; missing: the trial's block does not cross it"};
+  for (const auto& [level, sets] : factor.levels)
+    out.levels.emplace_back(kept(level), kept("sets " + sets));
+  return out;
+}
+
+std::vector<Column> with_factors(std::vector<Column> columns,
+                                 const std::vector<StoredFactor>& factors) {
+  const auto place = std::ranges::find_if(
+      columns, [](const Column& one) { return std::string_view(one.name) == "practice"; });
+  std::vector<Column> more;
+  for (const StoredFactor& factor : factors) more.push_back(column_of(factor));
+  columns.insert(place + 1, more.begin(), more.end());
+  return columns;
+}
+
+/// \param cut_off  of attempts that were cut off
+std::span<const Column> columns_for(const ExportClock& clock, bool cut_off) {
+  const bool torque = !cut_off && clock.torque().any(), tasks = !cut_off && clock.tasks();
+  const bool groups = clock.groups().any(), relative = clock.relative();
+  std::vector<std::pair<std::string, std::string>> levels;
+  for (const StoredFactor& factor : clock.factors()) {
+    levels.emplace_back(factor.name, "");
+    levels.insert(levels.end(), factor.levels.begin(), factor.levels.end());
+  }
+  static std::map<std::tuple<bool, bool, bool, bool, bool, decltype(levels)>, std::vector<Column>>
+      tables;
+  static std::mutex mutex;
+  const std::lock_guard lock(mutex);
+  const auto [table, is_new] =
+      tables.try_emplace({cut_off, torque, tasks, groups, relative, std::move(levels)});
+  std::vector<Column>& columns = table->second;
+  if (!is_new) return columns;
+  columns = cut_off ? make_attempts() : make_trials();
+  if (tasks) columns = with_tasks(std::move(columns));
+  if (torque) columns = with_torque(std::move(columns));
+  if (relative) columns = made_relative(std::move(columns));
+  if (groups) columns = with_group(std::move(columns));
+  if (!clock.factors().empty()) columns = with_factors(std::move(columns), clock.factors());
+  return columns;
+}
+
 void add_to_list(std::string& list, std::optional<double> value, bool first) {
   if (!first) list += ';';
   char text[32];
@@ -325,22 +379,7 @@ bool fits_tsv(std::string_view text) {
 }  // namespace
 
 std::span<const Column> trial_columns(const ExportClock& clock) {
-  // What an export may have, as bits of an index.
-  enum : unsigned { kTorque = 1, kTasks = 2, kGroups = 4, kRelative = 8, kAll = 16 };
-  static const auto tables = [] {
-    std::array<std::vector<Column>, kAll> made;
-    for (unsigned parts = 0; parts < kAll; ++parts) {
-      std::vector<Column> columns = make_trials();
-      if (parts & kTasks) columns = with_tasks(std::move(columns));
-      if (parts & kTorque) columns = with_torque(std::move(columns));
-      if (parts & kRelative) columns = made_relative(std::move(columns));
-      if (parts & kGroups) columns = with_group(std::move(columns));
-      made[parts] = std::move(columns);
-    }
-    return made;
-  }();
-  return tables[(clock.torque().any() ? kTorque : 0U) | (clock.tasks() ? kTasks : 0U) |
-                (clock.groups().any() ? kGroups : 0U) | (clock.relative() ? kRelative : 0U)];
+  return columns_for(clock, false);
 }
 
 std::span<const Column> columns_of_trial(const ExportClock& clock) {
@@ -348,11 +387,7 @@ std::span<const Column> columns_of_trial(const ExportClock& clock) {
 }
 
 std::span<const Column> attempt_columns(const ExportClock& clock) {
-  static const std::vector<Column> absolute = make_attempts(), relative = made_relative(absolute),
-                                   absolute_of_groups = with_group(absolute),
-                                   relative_of_groups = with_group(relative);
-  if (clock.groups().any()) return clock.relative() ? relative_of_groups : absolute_of_groups;
-  return clock.relative() ? relative : absolute;
+  return columns_for(clock, true);
 }
 
 const Column& group_column() { return kGroup; }
@@ -407,9 +442,11 @@ void put_attempt(DelimitedRow& row, const StoredTrial& attempt, const ExportCloc
   row << attempt.participant.code;
   if (clock.groups().any()) row << clock.groups().of(attempt.participant, attempt.protocol_sha256);
   row << record.session << record.block << record.trial << record.attempt << record.renderer
-      << record.shape;
+      << base_name(record.shape);
   for (const double q : record.orientation_wxyz) row << q;
-  row << record.practice << clock.onset_utc(attempt) << attempt.cut_off_reason << attempt.run.device
+  row << record.practice;
+  put_factors(row, record, clock);
+  row << clock.onset_utc(attempt) << attempt.cut_off_reason << attempt.run.device
       << attempt.participant.simulated << attempt.protocol_sha256 << attempt.run.program_version
       << attempt.participant.enrolled_number;
   if (clock.relative()) row << clock.elapsed(attempt);

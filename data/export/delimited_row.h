@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "data/base/cell_name.h"
 #include "data/column_table.h"
 #include "data/export/clock.h"
 #include "data/export/settings.h"
@@ -115,15 +116,25 @@ inline std::optional<bool> correct_of(const TrialRecord& record) {
   return record.correct;
 }
 
+/// The levels of the factors, in the order of clock.factors().
+template <class Row>
+void put_factors(Row& row, const TrialRecord& record, const ExportClock& clock) {
+  if (clock.factors().empty()) return;
+  const CellName name = cell_name(record.shape);
+  for (const StoredFactor& factor : clock.factors()) row << name.level(factor.name);
+}
+
 /// columns_of_trial(). \param row  a DelimitedRow or a ColumnTable
 template <class Row>
 void put_columns_of_trial(Row& row, const StoredTrial& trial, const ExportClock& clock) {
   const TrialRecord& record = trial.record;
-  row << record.session << record.block << record.trial << record.renderer << record.shape
-      << record.response << correct_of(record) << record.response_time;
+  row << record.session << record.block << record.trial << record.renderer
+      << base_name(record.shape) << record.response << correct_of(record) << record.response_time;
   for (const double q : record.orientation_wxyz) row << q;
-  row << record.practice << record.timed_out << record.first_contact_time << clock.onset_utc(trial)
-      << trial.run.device << trial.participant.simulated << record.missed_ticks << record.attempt
+  row << record.practice;
+  put_factors(row, record, clock);
+  row << record.timed_out << record.first_contact_time << clock.onset_utc(trial) << trial.run.device
+      << trial.participant.simulated << record.missed_ticks << record.attempt
       << trial.protocol_sha256 << trial.run.program_version << trial.participant.enrolled_number
       << record.started_inside << record.ticks
       << static_cast<double>(record.longest_period_ns) / 1e9 << record.faults << record.max_force

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <numeric>
 #include <utility>
 #include <variant>
 
@@ -21,27 +23,43 @@ constexpr long long kLeastUnanswered = 10;  // trials
 /// Whether trial `shown` (from 0) of an adaptive block is a catch trial.
 bool is_catch_trial(const Protocol& protocol, int participant, std::uint64_t block,
                     std::size_t shown) {
-  const double share = protocol.blocks[static_cast<std::size_t>(block)].catch_trials;
+  const TaskBlock& asked = protocol.blocks[static_cast<std::size_t>(block)];
+  const double share = asked.catch_trials;
   if (!(share > 0)) return false;
   const auto window = std::max(kCatchWindow, static_cast<std::size_t>(std::lround(1 / share)));
   const auto count = std::max(
       std::size_t{1}, static_cast<std::size_t>(std::lround(share * static_cast<double>(window))));
   std::vector<int> marks(window, 0);
   std::fill(marks.begin(), marks.begin() + static_cast<std::ptrdiff_t>(count), 1);
-  Random random = task_stream(protocol.seed, participant, block, kTaskCatch, shown / window);
+  Random random =
+      task_stream(protocol.seed, participant, stream_of(asked), kTaskCatch, shown / window);
   random.shuffle(marks);
   return marks[shown % window] == 1;
+}
+
+/// The number of a block's cells that stand apart, from index `first` on; 1: none do.
+int cells_of(const Protocol& protocol, int first) {
+  const auto begin = protocol.blocks.begin() + first;
+  return static_cast<int>(std::find_if(begin + 1, protocol.blocks.end(),
+                                       [&](const TaskBlock& block) {
+                                         return block.place != begin->place || !block.cell;
+                                       }) -
+                          begin);
 }
 
 }  // namespace
 
 std::vector<int> blocks_in_order(const Protocol& protocol, int participant_number, int session) {
   std::vector<std::vector<int>> units(1);  // each a block with the practice before it
-  for (int i = 0; i < static_cast<int>(protocol.blocks.size()); ++i) {
+  for (int i = 0; i < static_cast<int>(protocol.blocks.size());) {
     const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(i)];
-    if (block.session != session) continue;
-    units.back().push_back(i);
-    if (!block.practice) units.emplace_back();
+    const int cells = cells_of(protocol, i);
+    if (block.session == session) {
+      for (const int cell : latin_square_row(cells, protocol.groups.row(participant_number)))
+        units.back().push_back(i + cell);
+      if (!block.practice) units.emplace_back();
+    }
+    i += cells;
   }
   const std::vector<int> last = std::move(units.back());  // practice after the last block
   units.pop_back();
@@ -63,13 +81,16 @@ std::vector<int> blocks_in_order(const Protocol& protocol, int participant_numbe
 int block_orders(const Protocol& protocol) {
   if (study_of_shapes(protocol)) return renderer_orders(protocol);
   int orders = 1;
-  for (int session = 1; protocol.blocks_counterbalanced && session <= protocol.sessions.count;
-       ++session) {
-    const auto blocks =
-        static_cast<int>(std::ranges::count_if(protocol.blocks, [session](const TaskBlock& block) {
-          return block.session == session && !block.practice;
-        }));
-    if (blocks > 1) orders = std::max(orders, latin_square_rows(blocks));
+  std::map<int, int> blocks;  // by session
+  for (int i = 0; i < static_cast<int>(protocol.blocks.size());) {
+    const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(i)];
+    const int cells = cells_of(protocol, i);
+    orders = std::lcm(orders, latin_square_rows(cells));
+    if (!block.practice) ++blocks[block.session];
+    i += cells;
+  }
+  for (const auto& [session, count] : blocks) {
+    if (protocol.blocks_counterbalanced) orders = std::lcm(orders, latin_square_rows(count));
   }
   return orders;
 }
@@ -111,26 +132,26 @@ std::size_t most_unanswered(const TaskBlock& block) {
 DrawnTrial drawn_trial(const Protocol& protocol, int participant_number, int block,
                        std::size_t shown) {
   const auto index = static_cast<std::uint64_t>(block);
-  const auto intervals = protocol.blocks[static_cast<std::size_t>(block)].intervals;
+  const TaskBlock& asked = protocol.blocks[static_cast<std::size_t>(block)];
   DrawnTrial out;
   out.catch_trial = is_catch_trial(protocol, participant_number, index, shown);
-  Random random = task_stream(protocol.seed, participant_number, index, kTaskPosition, shown + 1);
-  out.position = static_cast<int>(random.below(static_cast<std::uint64_t>(intervals)));
+  Random random =
+      task_stream(protocol.seed, participant_number, stream_of(asked), kTaskPosition, shown + 1);
+  out.position = static_cast<int>(random.below(static_cast<std::uint64_t>(asked.intervals)));
   out.orientation = orientation_in_block(protocol, participant_number, index, shown);
   return out;
 }
 
 std::vector<int> track_order(const Protocol& protocol, int participant_number, int block,
                              std::uint64_t round) {
-  const auto index = static_cast<std::uint64_t>(block);
-  std::vector<std::size_t> tracks(
-      tracks_of(protocol.blocks[static_cast<std::size_t>(block)]).size());
+  const TaskBlock& asked = protocol.blocks[static_cast<std::size_t>(block)];
+  std::vector<std::size_t> tracks(tracks_of(asked).size());
   for (std::size_t i = 0; i < tracks.size(); ++i) tracks[i] = i;
   std::vector<int> out;
-  for (const std::size_t track :
-       round_of_tracks(task_stream(protocol.seed, participant_number, index, kTaskTracks).next(),
-                       round, std::move(tracks)))
-    out.push_back(static_cast<int>(track) + 1);
+  for (const std::size_t track : round_of_tracks(
+           task_stream(protocol.seed, participant_number, stream_of(asked), kTaskTracks).next(),
+           round, std::move(tracks)))
+    out.push_back(first_track(asked) + static_cast<int>(track));
   return out;
 }
 

@@ -1,6 +1,9 @@
 #include "protocols/tasks/block_procedures.h"
 
+#include <algorithm>
+#include <cstddef>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <utility>
 
 #include "protocols/json_document.h"
@@ -10,14 +13,33 @@
 
 namespace palpate::protocols {
 
+namespace {
+
+std::size_t count_of(const nlohmann::json& of, const char* list, std::size_t missing) {
+  const auto found = of.is_object() ? of.find(list) : of.end();
+  return found != of.end() && found->is_array() ? found->size() : missing;
+}
+
+bool has_cells_apart(const nlohmann::json& block) {
+  return block.is_object() && block.contains("factors") && block.value("mixing", "") == "blocked";
+}
+
+}  // namespace
+
 const ProcedureSpec& BlockProcedures::spec_of(int track) const {
   return specs[static_cast<std::size_t>(track - 1) % specs.size()];
 }
 
 Procedure BlockProcedures::begin(int participant_number, int track) const {
+  auto own = static_cast<std::size_t>(track - 1);
+  std::optional<std::size_t> cell;
+  if (tracks_of_cell > 0) {
+    cell = own / tracks_of_cell;
+    own %= tracks_of_cell;
+  }
   const std::uint64_t seed =
-      task_stream(protocol_seed, participant_number, index, kTaskTracks).next();
-  return {spec_of(track), track_seed(seed, static_cast<std::size_t>(track - 1))};
+      task_stream(protocol_seed, participant_number, stream_of(index, cell), kTaskTracks).next();
+  return {spec_of(track), track_seed(seed, own)};
 }
 
 std::map<std::string, BlockProcedures> procedures_of_blocks(const std::string& text,
@@ -32,8 +54,14 @@ std::map<std::string, BlockProcedures> procedures_of_blocks(const std::string& t
     ObjectReader block(one, "/blocks/" + std::to_string(all.size()), faults);
     std::string name;
     block.name("name", name);
-    BlockProcedures procedures{seed, all.size(), {}};
+    BlockProcedures procedures;
+    procedures.protocol_seed = seed;
+    procedures.index = all.size();
     read_procedures(block, procedures.specs);
+    if (has_cells_apart(one))
+      procedures.tracks_of_cell = count_of(one, "stimuli", 1) *
+                                  count_of(one, "renderers", count_of(root, "renderers", 1)) *
+                                  std::max<std::size_t>(1, procedures.specs.size());
     block.choice("asks", procedures.asks_smaller, {{"larger", false}, {"smaller", true}});
     const nlohmann::json::json_pointer path("/level/path");
     if (one.is_object() && one.contains(path) && one[path].is_string())

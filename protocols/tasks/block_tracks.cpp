@@ -1,12 +1,19 @@
 #include "protocols/tasks/block_tracks.h"
 
 #include <cmath>
+#include <map>
 #include <utility>
 
 namespace palpate::protocols {
 namespace {
 
-constexpr std::uint64_t kTaskStream = 5;  // schedule.cpp uses 1 to 4
+constexpr std::uint64_t kTaskStream = 5;      // schedule.cpp uses 1 to 4
+constexpr std::uint64_t kCellStreams = 1000;  // more than blocks of a protocol
+
+int in_cell(const std::map<int, int>& of_cells, int stimulus, std::optional<int> plain) {
+  const auto found = of_cells.find(stimulus);
+  return found != of_cells.end() ? found->second : plain.value_or(-1);
+}
 
 }  // namespace
 
@@ -27,6 +34,16 @@ std::vector<BlockTrack> tracks_of(const TaskBlock& block) {
   return tracks;
 }
 
+int first_track(const TaskBlock& block) {
+  return 1 + static_cast<int>(block.cell.value_or(0) * tracks_of(block).size());
+}
+
+std::uint64_t stream_of(std::size_t place, std::optional<std::size_t> cell) {
+  return place + (cell ? kCellStreams * (*cell + 1) : 0);
+}
+
+std::uint64_t stream_of(const TaskBlock& block) { return stream_of(block.place, block.cell); }
+
 long long with_catch_trials(const TaskBlock& block, long long trials) {
   return trials +
          std::llround(static_cast<double>(trials) * block.catch_trials / (1 - block.catch_trials));
@@ -34,7 +51,7 @@ long long with_catch_trials(const TaskBlock& block, long long trials) {
 
 void set_intervals(const TaskBlock& block, int position, Trial& trial) {
   const Interval asked{trial.stimulus, trial.renderer, trial.level};
-  const Interval standard{block.standard.value_or(-1),
+  const Interval standard{in_cell(block.standard_of, trial.stimulus, block.standard),
                           block.standard_renderer.value_or(trial.renderer), std::nullopt, true};
   switch (block.task) {
     case TaskKind::identify:
@@ -47,7 +64,9 @@ void set_intervals(const TaskBlock& block, int position, Trial& trial) {
       break;
     case TaskKind::detect:
       trial.intervals = {asked};
-      if (trial.catch_trial) trial.intervals[0] = {block.absent.value_or(-1), trial.renderer};
+      if (trial.catch_trial)
+        trial.intervals[0] = {in_cell(block.absent_of, trial.stimulus, block.absent),
+                              trial.renderer};
       break;
     case TaskKind::rate:
       trial.intervals = {asked};

@@ -1,7 +1,9 @@
 #pragma once
 // The tracks of a block, the intervals of its trials, and its random streams.
 
+#include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "data/base/random.h"
@@ -20,6 +22,9 @@ struct BlockTrack {
 /// The tracks in order of their numbers, from 1: the procedure varies fastest.
 std::vector<BlockTrack> tracks_of(const TaskBlock& block);
 
+/// The number of the first track: the cells of a block number theirs together.
+int first_track(const TaskBlock& block);
+
 /// The number of trials with catch trials included.
 long long with_catch_trials(const TaskBlock& block, long long trials);
 
@@ -35,8 +40,12 @@ enum TaskUse : std::uint64_t {
   kTaskCatch = 4,
   kTaskTracks = 5
 };
+/// The number of a block's random streams: its place, or one of its own for a cell apart, so that a
+/// block has the same streams whatever factors others cross.
+std::uint64_t stream_of(std::size_t place, std::optional<std::size_t> cell);
+std::uint64_t stream_of(const TaskBlock& block);
 /// \param seed  of the protocol
-/// \param block  its index
+/// \param block  stream_of it
 Random task_stream(std::uint64_t seed, int participant, std::uint64_t block, TaskUse use,
                    std::uint64_t number = 0);
 

@@ -42,6 +42,7 @@ void add_levels(const TaskBlock& block, const BlockTrack& track, Category catego
 
 std::vector<Category> categories_of(const Protocol& protocol, const TaskBlock& block) {
   std::vector<Category> categories;
+  const int first = first_track(block);
   int number = 0;
   long long trials = 0;
   for (const BlockTrack& track : tracks_of(block)) {
@@ -50,7 +51,7 @@ std::vector<Category> categories_of(const Protocol& protocol, const TaskBlock& b
                     to_string(track.renderer) + ")";
     category.trial.stimulus = track.stimulus;
     category.trial.renderer = track.renderer;
-    category.trial.track = ++number;
+    category.trial.track = first + number++;
     add_levels(block, track, category, categories);
   }
   for (const Category& category : categories) trials += category.count;
@@ -64,7 +65,7 @@ std::vector<Category> categories_of(const Protocol& protocol, const TaskBlock& b
     category.name = "catch trial";
     category.trial.stimulus = track.stimulus;
     category.trial.renderer = track.renderer;
-    category.trial.track = t + 1;
+    category.trial.track = first + t;
     category.trial.catch_trial = true;
     category.count = catch_trials / tracks + (t < catch_trials % tracks ? 1 : 0);
     if (category.count > 0) categories.push_back(std::move(category));
@@ -113,7 +114,7 @@ std::vector<Trial> fixed_trials(const Protocol& protocol, int participant, int i
     set_intervals(block, 0, trial);
     return std::vector<Trial>(static_cast<std::size_t>(block.repetitions), trial);
   }
-  const auto number = static_cast<std::uint64_t>(index);
+  const std::uint64_t number = stream_of(block);
   std::vector<Category> categories = categories_of(protocol, block);
   Random places = task_stream(protocol.seed, participant, number, kTaskPosition, round);
   std::vector<std::vector<int>> left;
@@ -182,7 +183,7 @@ std::vector<Trial> shapes_trials(const Protocol& protocol, int participant, int 
       return track.stimulus == trial.stimulus && track.renderer == trial.renderer;
     };
     const auto track = std::find_if(tracks.begin(), tracks.end(), is_its);
-    trial.track = static_cast<int>(track - tracks.begin()) + 1;
+    trial.track = first_track(block) + static_cast<int>(track - tracks.begin());
     set_intervals(block, 0, trial);
   }
   return trials;
@@ -209,7 +210,7 @@ void draw_shape_orientations(const Protocol& protocol, int participant, int inde
 
 bool has_order_of_shapes(const TaskBlock& block) {
   if (block.order == BlockOrder::shapes) return true;
-  return block.task == TaskKind::identify && block.procedures.empty() &&
+  return block.task == TaskKind::identify && block.procedures.empty() && block.factors.empty() &&
          (block.renderers.size() == 1 || (!block.max_run && !block.min_distance));
 }
 
@@ -224,7 +225,9 @@ std::vector<Trial> trials_of_block(const Protocol& protocol, int participant, in
 
 Quat orientation_in_block(const Protocol& protocol, int participant, std::uint64_t block,
                           std::size_t shown) {
-  Random random = task_stream(protocol.seed, participant, block, kTaskOrientation, shown + 1);
+  Random random = task_stream(protocol.seed, participant,
+                              stream_of(protocol.blocks[static_cast<std::size_t>(block)]),
+                              kTaskOrientation, shown + 1);
   switch (protocol.orientation) {
     case OrientationKind::uniform:
       return stimuli::uniform_rotation(random);

@@ -1,9 +1,9 @@
 #pragma once
 // The trials of a block whose levels do not follow from the answers.
 //
-// Identification without levels has the order and orientations of the study of shapes for the same
-// design (schedule.h), if a block has one renderer, or several without limits on the order. Other
-// blocks have a random order under the limits of the block.
+// Identification without levels and factors has the order and orientations of the study of shapes
+// for the same design (schedule.h), if a block has one renderer, or several without limits on the
+// order. Other blocks have a random order under the limits of the block.
 
 #include <cstdint>
 #include <vector>

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "protocols/answer_keys.h"
+#include "protocols/factors.h"
 #include "protocols/json_document.h"
 #include "protocols/order.h"
 #include "protocols/parse_scene.h"
@@ -228,8 +229,6 @@ void read_answers(ObjectReader& reader, const Protocol& protocol, TaskBlock& blo
 }
 
 constexpr long long kMostTaskTrials = 1000000;
-
-std::string pointer_of_block(std::size_t i) { return "/blocks/" + std::to_string(i); }
 
 void check_levels_of(const Protocol& protocol, const TaskBlock& block, const std::string& pointer,
                      FaultList& faults) {
@@ -552,6 +551,10 @@ void check_practice(ObjectReader& reader, const TaskBlock& block) {
   }
 }
 
+std::string block_pointer(std::size_t i) { return "/blocks/" + std::to_string(i); }
+
+}  // namespace
+
 TaskBlock read_block(ObjectReader& reader, const Protocol& protocol) {
   TaskBlock block;
   std::optional<TaskKind> task;
@@ -592,11 +595,12 @@ TaskBlock read_block(ObjectReader& reader, const Protocol& protocol) {
                         "expected no feedback: no answer to this task is right or wrong");
   }
   read_answers(reader, protocol, block);
+  read_crossing(reader, protocol, block);
   reader.refuse_unknown_keys();
   return block;
 }
 
-std::string block_pointer(std::size_t i) { return "/blocks/" + std::to_string(i); }
+namespace {
 
 void check_names(ObjectReader& item, const std::string& name, std::set<std::string>& names) {
   if (!name.empty() && !names.insert(name).second)
@@ -643,16 +647,16 @@ std::vector<ScaleStep> read_scale_steps(ObjectReader& reader, const char* key, P
 void check_blocks(const Protocol& protocol, FaultList& faults) {
   for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
     const TaskBlock& block = protocol.blocks[i];
-    check_levels_of(protocol, block, pointer_of_block(i), faults);
+    check_levels_of(protocol, block, block_pointer(protocol.blocks[i].place), faults);
     if (block.level && block.task != TaskKind::detect && block.standard &&
         !own_level(protocol, block, *block.standard)) {
-      faults.add(pointer_of_block(i) + "/standard",
+      faults.add(block_pointer(protocol.blocks[i].place) + "/standard",
                  "expected a stimulus that has " + block.level->pointer + " itself");
     }
   }
   faults.throw_if_any();
   for (std::size_t i = 0; i < protocol.blocks.size(); ++i)
-    check_easier(protocol, protocol.blocks[i], pointer_of_block(i), faults);
+    check_easier(protocol, protocol.blocks[i], block_pointer(protocol.blocks[i].place), faults);
   long long trials = 0;
   for (const TaskBlock& block : protocol.blocks) trials += most_trials_of(block);
   if (trials > kMostTaskTrials) {
@@ -664,7 +668,7 @@ void check_blocks(const Protocol& protocol, FaultList& faults) {
     try {
       check_order(protocol, static_cast<int>(i));
     } catch (const ScheduleError& error) {
-      faults.add(pointer_of_block(i) + "/order", error.what());
+      faults.add(block_pointer(protocol.blocks[i].place) + "/order", error.what());
     }
   }
 }
@@ -678,6 +682,7 @@ void read_blocks(ObjectReader& reader, Protocol& protocol) {
   for (std::size_t i = 0; i < list->size(); ++i) {
     ObjectReader item((*list)[i], child_pointer(reader.pointer("blocks"), i), reader.faults());
     protocol.blocks.push_back(read_block(item, protocol));
+    protocol.blocks.back().place = i;
     check_names(item, protocol.blocks.back().name, names);
     protocol.sessions.count = std::max(protocol.sessions.count, protocol.blocks.back().session);
   }

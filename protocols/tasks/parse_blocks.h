@@ -15,6 +15,8 @@ namespace palpate::protocols {
 /// keys become faults.
 std::optional<ProcedureSpec> read_procedure(ObjectReader& reader);
 
+/// Reads a block, which refers to the renderers, stimuli and factors of the protocol.
+TaskBlock read_block(ObjectReader& reader, const Protocol& protocol);
 /// Reads blocks, which refer to the renderers and stimuli of the protocol, and block_order.
 void read_blocks(ObjectReader& reader, Protocol& protocol);
 /// Reads `procedure` of a block: one, or a list of them.

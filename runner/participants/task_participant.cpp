@@ -10,6 +10,7 @@
 #include <tuple>
 #include <utility>
 
+#include "data/base/cell_name.h"
 #include "protocols/parse.h"
 #include "protocols/tasks/levels.h"
 #include "stimuli/primitives.h"
@@ -60,14 +61,31 @@ constexpr std::uint64_t kJudgement = 9;  // random stream; the hand has 1 to 3
 constexpr std::uint64_t kPages = 10;     // likewise
 constexpr int kMostIntervals = 64;       // trials of the hand within one of the session
 
+/// The stimuli of a block that shape tells apart: of those that are one stimulus in several cells
+/// and have one form, the first.
+std::vector<int> forms_of(const protocols::Protocol& protocol, const protocols::TaskBlock& block) {
+  std::vector<int> out;
+  for (const int stimulus : block.stimuli) {
+    const auto& one = protocol.stimuli[static_cast<std::size_t>(stimulus)];
+    const bool known = std::ranges::any_of(out, [&](int other) {
+      const auto& before = protocol.stimuli[static_cast<std::size_t>(other)];
+      return base_name(before.name) == base_name(one.name) &&
+             have_one_form(before.object, one.object);
+    });
+    if (!known) out.push_back(stimulus);
+  }
+  return out;
+}
+
 /// Whether the observer of shapes can identify a block's stimuli.
 bool is_identified_by_shape(const protocols::Protocol& protocol,
                             const protocols::TaskBlock& block) {
   if (block.order == protocols::BlockOrder::shapes) return true;
   if (block.task != protocols::TaskKind::identify || block.level) return false;
-  for (std::size_t i = 0; i < block.stimuli.size(); ++i) {
+  const std::vector<int> forms = forms_of(protocol, block);
+  for (std::size_t i = 0; i < forms.size(); ++i) {
     const auto object = [&](std::size_t k) -> const stimuli::ObjectSpec& {
-      return protocol.stimuli[static_cast<std::size_t>(block.stimuli[k])].object;
+      return protocol.stimuli[static_cast<std::size_t>(forms[k])].object;
     };
     if (!ShapeHypotheses::fault_of(object(i)).empty()) return false;
     for (std::size_t k = 0; k < i; ++k) {
@@ -300,7 +318,8 @@ int TaskJudgement::identified() {
   evidence_ = 2;
   if (settings_.share_correct) {
     const auto& all = block().answers;
-    const int right = index_of(protocol_.stimuli[static_cast<std::size_t>(found)].name.c_str());
+    const int right =
+        index_of(base_name(protocol_.stimuli[static_cast<std::size_t>(found)].name).c_str());
     if (random_.unit() < *settings_.share_correct || all.size() < 2) return right;
     const auto count = static_cast<std::uint64_t>(all.size());
     return static_cast<int>((static_cast<std::uint64_t>(right) + 1 + random_.below(count - 1)) %
@@ -316,7 +335,7 @@ int TaskJudgement::identified() {
                               [&](int a, int b) { return apart(a) < apart(b); });
     evidence_ = std::max(0.0, 2 - apart(found) / settings_.weber);
   }
-  return index_of(protocol_.stimuli[static_cast<std::size_t>(found)].name.c_str());
+  return index_of(base_name(protocol_.stimuli[static_cast<std::size_t>(found)].name).c_str());
 }
 
 /// A step of a scale, from 0.
@@ -378,7 +397,7 @@ BlockHypotheses block_hypotheses(const protocols::Protocol& protocol) {
     std::shared_ptr<const ShapeHypotheses>& shared = known[block.stimuli];
     if (!shared) {
       std::vector<stimuli::ObjectSpec> objects;
-      for (const int stimulus : block.stimuli)
+      for (const int stimulus : forms_of(protocol, block))
         objects.push_back(protocol.stimuli[static_cast<std::size_t>(stimulus)].object);
       shared = std::make_shared<const ShapeHypotheses>(objects);
     }
@@ -456,8 +475,8 @@ Answer TaskParticipant::answer(std::int64_t time_ns) {
 std::optional<Answer> TaskParticipant::identify(const servo::Sample& sample) {
   std::optional<Answer> found = identifier_->step(sample);
   if (!found) return found;
-  const int stimulus = block().stimuli[static_cast<std::size_t>(found->stimulus)];
-  const std::string& name = protocol_.stimuli[static_cast<std::size_t>(stimulus)].name;
+  const int stimulus = forms_of(protocol_, block())[static_cast<std::size_t>(found->stimulus)];
+  const std::string name = base_name(protocol_.stimuli[static_cast<std::size_t>(stimulus)].name);
   const auto& answers = block().answers;
   const auto at = std::find_if(answers.begin(), answers.end(),
                                [&](const auto& answer) { return answer.name == name; });

@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "data/base/cell_name.h"
 #include "data/base/checksum.h"
 #include "data/files/utc.h"
 #include "protocols/schedule.h"
@@ -37,7 +38,7 @@ bool comparison_is_right(const protocols::TaskBlock& block, const data::TaskReco
 /// Whether the response is the stimulus, or with several intervals the number of the one that is no
 /// standard.
 bool names_what_is_asked(const protocols::Trial& trial, const data::TrialRecord& record) {
-  if (trial.intervals.size() == 1) return record.response == record.shape;
+  if (trial.intervals.size() == 1) return record.response == base_name(record.shape);
   const auto asked = std::ranges::find(trial.intervals, false, &protocols::Interval::standard);
   return record.response == std::to_string(asked - trial.intervals.begin() + 1);
 }
@@ -268,7 +269,7 @@ void Session::judge(const protocols::Trial& trial, const participants::Answer& a
   switch (block.task) {
     case TaskKind::identify:
       record_.response = chosen(block, answer).name;
-      record_.correct = task.success = record_.response == record_.shape;
+      record_.correct = task.success = record_.response == base_name(record_.shape);
       break;
     case TaskKind::compare:
       record_.response = chosen(block, answer).name;
@@ -511,8 +512,8 @@ void Session::rest() {
 }
 
 void Session::cut_off(const std::string& reason) {
+  station_.log.cut_off(reason);  // first: what is told is on record
   if (events_ != nullptr) events_->cut_off(reason);
-  station_.log.cut_off(reason);
 }
 
 bool Session::run_trial() {

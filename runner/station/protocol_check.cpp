@@ -5,6 +5,8 @@
 #include <map>
 #include <utility>
 
+#include "data/base/cell_name.h"
+#include "protocols/factors.h"
 #include "protocols/schedule.h"
 #include "protocols/tasks/block_order.h"
 #include "runner/devices/registry.h"
@@ -25,7 +27,8 @@ constexpr double kToIdentify = 10, kToJudge = 5, kToAdjust = 20;
 std::string place_of_stimulus(const std::string& name, const protocols::Protocol& protocol) {
   for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
     const std::string& known = protocol.stimuli[i].name;
-    if (name == known || name.starts_with(known + " at ")) return "/stimuli/" + std::to_string(i);
+    if (name == known || name.starts_with(known + " at "))
+      return "/stimuli/" + std::to_string(protocol.stimuli[i].place);
   }
   return "";
 }
@@ -89,8 +92,12 @@ Json verdict_json(const Verdict& verdict, const protocols::Protocol& protocol) {
 
 Json block_json(const protocols::Protocol& protocol, const protocols::TaskBlock& block) {
   Json out{{"name", block.name}, {"task", protocols::to_string(block.task)}};
-  for (const int stimulus : block.stimuli)
-    out["stimuli"].push_back(protocol.stimuli[static_cast<std::size_t>(stimulus)].name);
+  Json& shown = out["stimuli"];
+  for (const int stimulus : block.stimuli) {
+    const Json name = base_name(protocol.stimuli[static_cast<std::size_t>(stimulus)].name);
+    if (std::ranges::find(shown, name) == shown.end()) shown.push_back(name);
+  }
+  if (!block.factors.empty()) out["cells"] = block.cell ? 1 : protocols::cells_of(block);
   out["session"] = block.session;
   out["practice"] = block.practice;
   out["adaptive"] = protocols::is_adaptive(block);
@@ -109,8 +116,13 @@ Json summary_json(const protocols::Protocol& protocol) {
            {"sessions", protocol.sessions.count}};
   for (const protocols::RendererKind kind : protocol.renderers)
     out["renderers"].push_back(protocols::to_string(kind));
-  for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
-    out["stimuli"].push_back(stimulus.name);
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
+    if (stimulus.name == base_name(stimulus.name)) out["stimuli"].push_back(stimulus.name);
+  }
+  for (const protocols::Factor& factor : protocol.factors) {
+    for (const protocols::FactorLevel& level : factor.levels)
+      out["factors"][factor.name].push_back(level.name);
+  }
   long long trials = 0;
   if (protocols::study_of_shapes(protocol)) {
     trials = protocols::main_trials(protocol);
@@ -178,7 +190,10 @@ std::vector<GroupedReason> grouped(const std::vector<std::string>& reasons,
   for (const std::string& reason : reasons) {
     const SplitReason parts = split(reason, protocol);
     const auto [at, is_new] = known.emplace(parts.rest, out.size());
-    if (is_new) out.push_back({reason.substr(0, reason.find("; likewise ")), {}});
+    if (is_new)
+      out.push_back({reason.substr(0, reason.find("; likewise ")), {}, 0});
+    else
+      ++out[at->second].others;
     std::vector<std::string>& where = out[at->second].where;
     if (!parts.where.empty() && std::ranges::find(where, parts.where) == where.end())
       where.push_back(parts.where);

@@ -2,6 +2,7 @@
 // What `palpate validate` finds in a file, as values: faults, a summary, which devices can show it
 // and why not, how long a session takes.
 
+#include <cstddef>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
@@ -38,6 +39,7 @@ Verdict simulation_verdict(const protocols::Protocol& protocol, const StimulusLi
 struct GroupedReason {
   std::string text;                ///< the first place's sentence
   std::vector<std::string> where;  ///< JSON pointers; empty: the protocol as a whole
+  std::size_t others = 0;          ///< sentences besides the first
 };
 /// Joins sentences that differ only in the stimulus, its level or the renderer that they name.
 std::vector<GroupedReason> grouped(const std::vector<std::string>& reasons,

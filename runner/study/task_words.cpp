@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "data/base/cell_name.h"
 #include "data/base/random.h"
 #include "protocols/procedures/procedure.h"
 #include "protocols/tasks/block_order.h"
@@ -71,16 +72,19 @@ std::string csv_text(const protocols::Protocol& protocol, int participant,
   for (const char* more :
        {"task", "block_name", "track", "level", "catch_trial", "comparison_interval", "example"})
     columns.emplace_back(more);
+  for (const protocols::Factor& factor : protocol.factors) columns.push_back(factor.name);
   output::CsvText table(columns, "\r\n");
   for (const protocols::Trial& trial : trials) {
     const ListedTrial row = listed(protocol, trial);
     const Quat& q = trial.orientation;
     table << participant << trial.session << trial.block << trial.trial
-          << protocols::to_string(trial.renderer) << row.stimulus << q.w << q.x << q.y << q.z
-          << trial.practice << protocol.sha256 << PALPATE_VERSION
+          << protocols::to_string(trial.renderer) << base_name(row.stimulus) << q.w << q.x << q.y
+          << q.z << trial.practice << protocol.sha256 << PALPATE_VERSION
           << protocols::to_string(row.block.task) << row.block.name << trial.track << row.level
           << trial.catch_trial << (row.comparison > 0 ? std::to_string(row.comparison) : "")
           << row.example;
+    for (const protocols::Factor& factor : protocol.factors)
+      table << cell_name(row.stimulus).level(factor.name);
     table.end_row();
   }
   return table.text();
@@ -99,13 +103,15 @@ std::string json_text(const protocols::Protocol& protocol, int participant,
                                   {"block_name", row.block.name},
                                   {"track", trial.track},
                                   {"renderer", protocols::to_string(trial.renderer)},
-                                  {"shape", row.stimulus},
+                                  {"shape", base_name(row.stimulus)},
                                   {"level", nullptr},
                                   {"catch_trial", trial.catch_trial},
                                   {"comparison_interval", nullptr},
                                   {"orientation_wxyz", {q.w, q.x, q.y, q.z}},
                                   {"practice", trial.practice},
                                   {"example", row.example}};
+    for (const auto& [factor, level] : cell_name(row.stimulus).levels)
+      out["factors"][factor] = level;
     if (trial.level) out["level"] = *trial.level;
     if (row.comparison > 0) out["comparison_interval"] = row.comparison;
     rows.push_back(std::move(out));
@@ -287,12 +293,29 @@ std::vector<std::string> in_words(const protocols::Protocol& protocol,
                                   const protocols::TaskBlock& block) {
   const auto name = [&](int i) { return protocol.stimuli[static_cast<std::size_t>(i)].name; };
   std::string head = std::string(to_string(block.task)) + " ";
-  for (std::size_t i = 0; i < block.stimuli.size(); ++i)
-    head += (i > 0 ? ", " : "") + name(block.stimuli[i]);
+  std::vector<std::string> shown;
+  for (const int stimulus : block.stimuli) {
+    const std::string plain = base_name(name(stimulus));
+    if (std::ranges::find(shown, plain) == shown.end()) shown.push_back(plain);
+  }
+  for (std::size_t i = 0; i < shown.size(); ++i) head += (i > 0 ? ", " : "") + shown[i];
   if (block.standard) head += " with " + name(*block.standard);
   if (block.task == protocols::TaskKind::compare)
     head += ", " + std::to_string(block.intervals) + " intervals";
   if (block.level) head += "; " + block.level->pointer + " varies";
+  if (block.cell) {
+    const CellName cell = cell_name(name(block.stimuli.front()));
+    for (const auto& [factor, level] : cell.levels) head += "; " + factor + " " + level;
+  } else if (!block.factors.empty()) {
+    head += "; mixed:";
+    for (const protocols::CrossedFactor& crossed : block.factors) {
+      const protocols::Factor& factor = protocol.factors[crossed.factor];
+      head += (&crossed == &block.factors.front() ? " " : " x ") + factor.name + " (";
+      for (const std::size_t level : crossed.levels)
+        head += (level == crossed.levels.front() ? "" : ", ") + factor.levels[level].name;
+      head += ")";
+    }
+  }
   if (block.catch_trials > 0)
     head += "; " + level_text(100 * block.catch_trials) + " % catch trials";
   if (block.practice) head += "; practice";

@@ -7,6 +7,7 @@
 #include <sstream>
 #include <utility>
 
+#include "data/base/cell_name.h"
 #include "data/base/text.h"
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
@@ -105,7 +106,9 @@ void print_task_summary(const protocols::Protocol& protocol, std::ostream& out) 
   std::vector<std::string> renderers, stimuli;
   for (const protocols::RendererKind kind : protocol.renderers)
     renderers.emplace_back(protocols::to_string(kind));
-  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) stimuli.push_back(stimulus.name);
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
+    if (stimulus.name == base_name(stimulus.name)) stimuli.push_back(stimulus.name);
+  }
   long long trials = 0;
   out << protocol.name << (protocol.title.empty() ? "" : ": " + printable(protocol.title))
       << "\n  renderers   " << list(renderers) << "\n  stimuli     " << list(stimuli)
@@ -165,10 +168,15 @@ void print_summary(const protocols::Protocol& protocol, std::ostream& out) {
 }
 
 void print_verdict(const std::string& what, const std::vector<std::string>& reasons,
+                   const protocols::Protocol& protocol,
                    const std::vector<session::LimitedMaterial>& limited, std::ostream& out) {
   out << "    " << std::left << std::setw(17) << what
       << (reasons.empty() ? limited.empty() ? "yes" : "yes, with limits:" : "no:") << "\n";
-  for (const std::string& reason : reasons) out << "      " << printable(reason) << "\n";
+  for (const station::GroupedReason& reason : station::grouped(reasons, protocol)) {
+    out << "      " << printable(reason.text);
+    if (reason.others > 0) out << "; likewise " << reason.others << " more";
+    out << "\n";
+  }
   if (!reasons.empty()) return;
   for (const session::LimitedMaterial& one : limited)
     out << "      " << printable(one.text) << "\n";
@@ -180,14 +188,14 @@ void print_fitness(const protocols::Protocol& protocol, const StimulusLibrary& l
                    const std::vector<devices::ChainTiming>& measured, std::ostream& out) {
   out << "  can be shown by (run --device NAME)\n";
   for (const station::Verdict& verdict : station::device_verdicts(protocol, library, measured)) {
-    print_verdict(verdict.name, verdict.reasons, verdict.limited, out);
+    print_verdict(verdict.name, verdict.reasons, protocol, verdict.limited, out);
     if (verdict.chain)
       out << "      with its delay of " << verdict.chain->counted() * 1e3
           << " ms from pose to force, measured " << printable(verdict.chain->made_utc) << "\n";
   }
   const station::Verdict simulated = station::simulation_verdict(protocol, library);
   out << "  can be tried with simulated participants\n";
-  print_verdict(simulated.name, simulated.reasons, simulated.limited, out);
+  print_verdict(simulated.name, simulated.reasons, protocol, simulated.limited, out);
 }
 
 /// Whether it is a scene: those have no version. Else it is a protocol, or what should be one.
@@ -275,7 +283,7 @@ void validate_scene(const std::string& text, const std::string& path, bool json,
     print_overlaps(spec.objects[i], "/objects/" + std::to_string(i), builder, out);
   out << "  materials can be shown by (explore, serve --device NAME)\n";
   for (const station::Verdict& verdict : scene_verdicts(spec))
-    print_verdict(verdict.name, verdict.reasons, {}, out);
+    print_verdict(verdict.name, verdict.reasons, {}, {}, out);
   out << "  touch it    palpate explore " << printable(shell_quoted(path)) << "\n";
 }
 
@@ -351,14 +359,15 @@ void validate_file(const ValidateRequest& request, std::ostream& out) {
   std::vector<protocols::Fault> faults;
   SceneBuilder builder;
   for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
-    check_meshes(protocol.stimuli[i].object, "/stimuli/" + std::to_string(i), file, builder,
-                 faults);
+    check_meshes(protocol.stimuli[i].object,
+                 "/stimuli/" + std::to_string(protocol.stimuli[i].place), file, builder, faults);
   }
   for (std::size_t g = 0; g < protocol.group_protocols.size(); ++g) {
     const std::vector<protocols::StimulusSpec>& stimuli = protocol.group_protocols[g]->stimuli;
     for (std::size_t i = 0; i < stimuli.size() && faults.empty(); ++i)
       check_meshes(stimuli[i].object,
-                   "/groups/patch/" + protocol.groups.names[g] + "/stimuli/" + std::to_string(i),
+                   "/groups/patch/" + protocol.groups.names[g] + "/stimuli/" +
+                       std::to_string(stimuli[i].place),
                    file, builder, faults);
   }
   if (!faults.empty()) throw protocols::InputError(faults);

@@ -61,13 +61,13 @@ class Groups(command_case.CommandCase):
         text, _ = self.exported(self.simulated(self.file("p.json", plain), "--participants", 2))
         self.assertTrue(text.startswith("participant_id,session,"))
         db = self.dir / "study.db"
-        self.assertNotIn("between_groups", self.analyzed("--db", db))
+        self.assertNotIn("by_design", self.analyzed("--db", db))
 
     def test_database_and_table_compare_groups_alike(self):
         db = self.simulated(self.grouped(), "--groups", "young=4,old=3")
         self.exported(db)
         found = [self.analyzed(*source) for source in (["--db", db], ["--csv", self.dir / "study.csv"])]
-        self.assertEqual(found[0]["between_groups"], found[1]["between_groups"])
+        self.assertEqual(found[0]["by_design"], found[1]["by_design"])
         self.assertEqual(found[0]["effects"], found[1]["effects"])
         effects = found[0]["effects"]["exponent"]["a"]
         self.assertEqual(set(effects), {"group", "renderer", "group:renderer"})
@@ -232,7 +232,7 @@ class Groups(command_case.CommandCase):
         db = self.dir / "two.db"
         self.palpate("simulate", PROTOCOLS / "stiffness-two-groups.json", "--db", db, "--groups", "young=3,older=3")
         found = self.analyzed("--db", db)
-        self.assertEqual({one["measure"] for one in found["between_groups"]}, {"pse", "jnd"})
+        self.assertEqual({one["measure"] for one in found["by_design"]}, {"pse", "jnd"})
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-#include "analysis/report/between_report.h"
+#include "analysis/report/design_report.h"
 
 #include <algorithm>
 #include <cmath>
@@ -36,35 +36,57 @@ GroupJson group_effect_json(const GroupEffect& effect) {
   return out;
 }
 
-/// The name of a condition; none: the mean over all.
-GroupJson renderer_json(const GroupedMeasure& of, const std::optional<std::size_t>& condition) {
-  return condition ? GroupJson(of.renderers[*condition]) : GroupJson(nullptr);
+const std::vector<std::string>& renderers_of(const GroupedMeasure& of) {
+  return of.within.front().levels;
+}
+
+GroupJson group_json(const GroupedMeasure& of, std::size_t group) {
+  return of.groups.empty() ? GroupJson(nullptr) : GroupJson(of.groups[group]);
+}
+
+/// Adds "renderer" and, of crossed factors, "factor" and "level"; null: the mean over all.
+void put_condition(const GroupedMeasure& of, const std::optional<DesignCondition>& condition,
+                   GroupJson& out) {
+  const bool of_renderer = condition && condition->factor == 0;
+  out["renderer"] =
+      of_renderer ? GroupJson(renderers_of(of)[condition->level]) : GroupJson(nullptr);
+  if (!of.crossed) return;
+  const bool of_factor = condition && condition->factor > 0;
+  const StudyFactor* const factor = of_factor ? &of.within[condition->factor] : nullptr;
+  out["factor"] = of_factor ? GroupJson(factor->name) : GroupJson(nullptr);
+  out["level"] = of_factor ? GroupJson(factor->levels[condition->level]) : GroupJson(nullptr);
 }
 
 GroupJson marginal_json(const GroupedMeasure& of, const GroupMarginal& one) {
-  return {{"group", of.groups[one.group]},
-          {"renderer", renderer_json(of, one.condition)},
-          {"n", one.n},
-          {"mean", number_json(one.mean)},
-          {"se", number_json(one.se)},
-          {"ci95", interval_json(one.ci95)}};
+  GroupJson out{{"group", group_json(of, one.group)}};
+  put_condition(of, one.condition, out);
+  out["n"] = one.n;
+  out["mean"] = number_json(one.mean);
+  out["se"] = number_json(one.se);
+  out["ci95"] = interval_json(one.ci95);
+  return out;
 }
 
 GroupJson contrast_json(const GroupedMeasure& of, const GroupContrast& one) {
-  GroupJson out{
-      {"reference", of.groups.front()},
-      {"compared", of.groups[one.group]},
-      {"renderer", renderer_json(of, one.condition)},
-      {"minus_renderer", one.of_difference ? GroupJson(of.renderers.front()) : GroupJson(nullptr)},
-      {"n_reference", one.n_reference},
-      {"n", one.n},
-      {"estimate", number_json(one.estimate)},
-      {"se", number_json(one.se)},
-      {"ci95", interval_json(one.ci95)},
-      {"t", number_json(one.t)},
-      {"df", number_json(one.df)},
-      {"p", number_json(one.p)},
-      {"p_holm", number_json(one.p_holm)}};
+  GroupJson out =
+      one.within ? GroupJson{{"within", group_json(of, one.group)}}
+                 : GroupJson{{"reference", of.groups.front()}, {"compared", of.groups[one.group]}};
+  put_condition(of, one.condition, out);
+  const StudyFactor* const factor = one.of_difference ? &of.within[one.condition->factor] : nullptr;
+  const bool of_renderer = factor != nullptr && one.condition->factor == 0;
+  out["minus_renderer"] = of_renderer ? GroupJson(factor->levels.front()) : GroupJson(nullptr);
+  if (of.crossed)
+    out["minus_level"] =
+        factor != nullptr && !of_renderer ? GroupJson(factor->levels.front()) : GroupJson(nullptr);
+  out["n_reference"] = one.n_reference;
+  out["n"] = one.n;
+  out["estimate"] = number_json(one.estimate);
+  out["se"] = number_json(one.se);
+  out["ci95"] = interval_json(one.ci95);
+  out["t"] = number_json(one.t);
+  out["df"] = number_json(one.df);
+  out["p"] = number_json(one.p);
+  out["p_holm"] = number_json(one.p_holm);
   if (!one.undefined.empty()) out["reason"] = one.undefined;
   return out;
 }
@@ -86,7 +108,7 @@ GroupJson model_json(const GroupedMeasure& of, const GroupedMixedModel& model) {
   out["means"] = GroupJson::array();
   for (const ModelMean& one : model.means)
     out["means"].push_back({{"group", of.groups[one.group]},
-                            {"renderer", of.renderers[one.renderer]},
+                            {"renderer", renderers_of(of)[one.renderer]},
                             {"estimate", number_json(one.value.estimate)},
                             {"se", number_json(one.value.se)},
                             {"df", number_json(one.value.df_satterthwaite)},
@@ -95,9 +117,14 @@ GroupJson model_json(const GroupedMeasure& of, const GroupedMixedModel& model) {
 }
 
 GroupJson measure_json(const GroupedMeasure& of) {
-  GroupJson out{{"measure", of.measure}, {"task", of.task},           {"block", of.block_name},
-                {"stimulus", of.shape},  {"unit", of.unit},           {"logarithms", of.logarithms},
-                {"groups", of.groups},   {"renderers", of.renderers}, {"n", of.result.anova.n}};
+  GroupJson out{{"measure", of.measure},  {"task", of.task},
+                {"block", of.block_name}, {"stimulus", of.shape},
+                {"unit", of.unit},        {"logarithms", of.logarithms},
+                {"groups", of.groups},    {"renderers", renderers_of(of)},
+                {"n", of.result.anova.n}};
+  if (of.crossed) {
+    for (const StudyFactor& factor : of.within) out["within"][factor.name] = factor.levels;
+  }
   if (!of.result.anova.undefined.empty()) out["reason"] = of.result.anova.undefined;
   out["left_out"] = GroupJson::array();
   for (const std::size_t row : of.result.dropped)
@@ -137,18 +164,59 @@ std::string figure_text(const GroupedMeasure& of, const std::optional<Interval>&
          figure_text(of, std::optional(interval->high)) + "]";
 }
 
-std::string condition_of(const GroupedMeasure& of, const std::optional<std::size_t>& condition) {
-  if (condition) return printable(of.renderers[*condition]);
-  return of.renderers.size() > 1 ? "both or all" : printable(of.renderers.front());
+/// "ray", "surface rough"
+std::string condition_name(const GroupedMeasure& of, const DesignCondition& condition) {
+  const StudyFactor& factor = of.within[condition.factor];
+  const std::string level = printable(factor.levels[condition.level]);
+  return condition.factor == 0 ? level : printable(factor.name) + " " + level;
 }
 
-/// "old - young", "old / young", with what is compared.
+std::string condition_of(const GroupedMeasure& of,
+                         const std::optional<DesignCondition>& condition) {
+  if (condition) return condition_name(of, *condition);
+  if (of.crossed) return "all cells";
+  const std::vector<std::string>& renderers = renderers_of(of);
+  return renderers.size() > 1 ? "both or all" : printable(renderers.front());
+}
+
+/// "old - young", "old / young", with what is compared; within a group "rough - smooth".
 std::string group_contrast_name(const GroupedMeasure& of, const GroupContrast& one) {
-  const std::string pair = printable(of.groups[one.group]) + (of.logarithms ? " / " : " - ") +
-                           printable(of.groups.front());
-  if (!one.of_difference) return pair;
-  return pair + " of " + printable(of.renderers[*one.condition]) + (of.logarithms ? " / " : " - ") +
-         printable(of.renderers.front());
+  const std::string minus = of.logarithms ? " / " : " - ";
+  const std::string levels = one.of_difference
+                                 ? condition_name(of, *one.condition) + minus +
+                                       printable(of.within[one.condition->factor].levels.front())
+                                 : "";
+  if (one.within)
+    return levels + (of.groups.empty() ? "" : " in " + printable(of.groups[one.group]));
+  const std::string pair = printable(of.groups[one.group]) + minus + printable(of.groups.front());
+  return one.of_difference ? pair + " of " + levels : pair;
+}
+
+/// "by group, surface and size"
+std::string design_words(const GroupedMeasure& of) {
+  std::vector<std::string> names;
+  if (!of.groups.empty()) names.emplace_back("group");
+  for (std::size_t f = 1; of.crossed && f < of.within.size(); ++f)
+    names.push_back(printable(of.within[f].name));
+  std::string out = "by ";
+  for (std::size_t i = 0; i < names.size(); ++i)
+    out += (i == 0 ? "" : i + 1 < names.size() ? ", " : " and ") + names[i];
+  return out;
+}
+
+/// "n of participants", of each group where there are groups
+std::string sizes_text(const GroupedMeasure& of) {
+  std::string out;
+  for (std::size_t i = 0; i < of.result.anova.n.size(); ++i) {
+    const std::string n = std::to_string(of.result.anova.n[i]);
+    out += (out.empty() ? "" : ", ") +
+           (of.groups.empty() ? n + " participants" : printable(of.groups[i]) + " " + n);
+  }
+  return out;
+}
+
+std::string contrast_kind(const GroupContrast& one) {
+  return one.within ? "within participants" : "between groups";
 }
 
 std::string f_test_text(const GroupEffect& effect) {
@@ -165,13 +233,15 @@ std::string f_test_text(const GroupEffect& effect) {
 
 std::string group_contrast_text(const GroupedMeasure& of, const GroupContrast& one) {
   std::string text = group_contrast_name(of, one);
-  if (!one.of_difference && of.renderers.size() > 1) text += ", " + condition_of(of, one.condition);
+  const bool several = of.crossed || renderers_of(of).size() > 1;
+  if (!one.of_difference && several) text += ", " + condition_of(of, one.condition);
   text += ": " + figure_text(of, one.estimate) + " " + figure_text(of, one.ci95);
   if (!one.t) return text + " (" + one.undefined + ")";
   text += ", t(" + short_number(*one.df) + ") = " + fixed(*one.t, 2) + ", " + p_phrase(*one.p);
-  if (one.p_holm && of.result.contrasts.size() > 1)
-    text += " (" + p_phrase(*one.p_holm) + " adjusted over " +
-            std::to_string(of.result.contrasts.size()) + " contrasts, Holm)";
+  const auto alike = std::ranges::count(of.result.contrasts, one.within, &GroupContrast::within);
+  if (one.p_holm && alike > 1)
+    text += " (" + p_phrase(*one.p_holm) + " adjusted over " + std::to_string(alike) +
+            " contrasts " + contrast_kind(one) + ", Holm)";
   return text;
 }
 
@@ -181,14 +251,14 @@ std::string group_caption(const std::string& caption, const std::string& label) 
 
 Table group_means_table(const GroupedMeasure& of, const std::string& label) {
   Table out;
-  out.caption = group_caption(title_of(of) + " by group", label);
-  out.header = {"Group", "Renderer", "n", of.unit.empty() ? "Mean" : "Mean (" + of.unit + ")",
-                "95 % interval"};
+  out.caption = group_caption(title_of(of) + " " + design_words(of), label);
+  out.header = {"Group", of.crossed ? "Condition" : "Renderer", "n",
+                of.unit.empty() ? "Mean" : "Mean (" + of.unit + ")", "95 % interval"};
   out.n_names = 2;
   for (const GroupMarginal& one : of.result.marginals) {
-    out.rows.push_back({printable(of.groups[one.group]), condition_of(of, one.condition),
-                        std::to_string(one.n), figure_text(of, one.mean),
-                        figure_text(of, one.ci95)});
+    out.rows.push_back({of.groups.empty() ? "all" : printable(of.groups[one.group]),
+                        condition_of(of, one.condition), std::to_string(one.n),
+                        figure_text(of, one.mean), figure_text(of, one.ci95)});
   }
   if (of.logarithms) out.notes.emplace_back("Geometric means over participants.");
   if (!of.result.dropped.empty()) {
@@ -202,7 +272,10 @@ Table group_means_table(const GroupedMeasure& of, const std::string& label) {
 
 Table group_effects_table(const GroupedMeasure& of, const std::string& label) {
   Table out;
-  out.caption = group_caption(title_of(of) + ": mixed analysis of variance", label);
+  out.caption = group_caption(
+      title_of(of) + (of.groups.empty() ? ": analysis of variance of repeated measures"
+                                        : ": mixed analysis of variance"),
+      label);
   out.header = {"Effect", "df", "F", "p", "p (Greenhouse-Geisser)", "Generalised eta squared"};
   for (const GroupEffect& one : of.result.anova.effects) {
     out.rows.push_back(
@@ -213,7 +286,8 @@ Table group_effects_table(const GroupedMeasure& of, const std::string& label) {
     if (!one.undefined.empty()) out.notes.push_back(one.name + ": " + one.undefined + ".");
   }
   if (!of.result.anova.undefined.empty()) out.notes.push_back(of.result.anova.undefined + ".");
-  out.notes.emplace_back("Type III: every group counts equally, whatever its size.");
+  if (!of.groups.empty())
+    out.notes.emplace_back("Type III: every group counts equally, whatever its size.");
   return out;
 }
 
@@ -237,10 +311,19 @@ Table group_model_table(const GroupedMeasure& of, const std::string& label) {
 
 Table group_contrasts_table(const GroupedMeasure& of, const std::string& label) {
   Table out;
-  out.caption = group_caption(title_of(of) + ": groups compared (Welch's t)", label);
-  out.header = {
-      "Contrast", "Renderer", of.logarithms ? "Ratio" : "Difference", "95 % interval", "t", "df",
-      "p",        "p (Holm)"};
+  out.caption = group_caption(title_of(of) + (!of.crossed         ? ": groups compared (Welch's t)"
+                                              : of.groups.empty() ? ": levels compared (paired t)"
+                                                                  : ": groups and levels compared "
+                                                                    "(Welch's t, paired t)"),
+                              label);
+  out.header = {"Contrast",
+                of.crossed ? "Condition" : "Renderer",
+                of.logarithms ? "Ratio" : "Difference",
+                "95 % interval",
+                "t",
+                "df",
+                "p",
+                "p (Holm)"};
   out.n_names = 2;
   for (const GroupContrast& one : of.result.contrasts) {
     out.rows.push_back(
@@ -253,18 +336,53 @@ Table group_contrasts_table(const GroupedMeasure& of, const std::string& label) 
   return out;
 }
 
+/// "differ between groups", "depend on surface", "the effect of surface depends on size"
+std::string finding_of(const std::string& what, const std::string& effect) {
+  std::vector<std::string> names;
+  for (std::size_t at = 0; at <= effect.size();) {
+    const std::size_t end = std::min(effect.find(':', at), effect.size());
+    names.push_back(effect.substr(at, end - at));
+    at = end + 1;
+  }
+  const bool groups = names.front() == "group";
+  if (groups) names.erase(names.begin());
+  if (names.empty()) return what + " differ between groups";
+  if (names.size() == 1 && !groups) return what + " depend on " + names.front();
+  std::string effects = "the effect of " + names.front();
+  for (std::size_t i = 1; i < names.size(); ++i) {
+    const bool last = i + 1 == names.size();
+    effects += (last && !groups    ? " depends on "
+                : i == 1 && groups ? " with "
+                                   : " and ") +
+               names[i];
+  }
+  return what + ": " + effects + (groups ? " differs between groups" : "");
+}
+
 }  // namespace
 
-void put_groups(const std::vector<GroupedMeasure>& measures, GroupJson& out) {
+void put_design(const StudyTable& table, const std::vector<GroupedMeasure>& measures,
+                GroupJson& out) {
   if (measures.empty()) return;
   std::vector<std::string> within{"renderer"};
-  for (const GroupedMeasure& one : measures) {
-    if (one.measure == "time") within = {"renderer", "shape"};
+  std::size_t cells = 1;
+  for (const StudyFactor& factor : table.factors) {
+    within.push_back(factor.name);
+    cells *= factor.levels.size();
   }
-  out["design"] = {{"between", {"group"}}, {"within", within}, {"groups", measures.front().groups}};
-  out["between_groups"] = GroupJson::array();
+  const bool shapes = std::ranges::any_of(measures, [](const GroupedMeasure& one) {
+    return one.measure == "time" && one.within.size() > 1;
+  });
+  if (shapes) within.emplace_back("shape");
+  out["design"] = {
+      {"between", GroupJson::array()}, {"within", within}, {"groups", measures.front().groups}};
+  if (!measures.front().groups.empty()) out["design"]["between"].push_back("group");
+  for (const StudyFactor& factor : table.factors)
+    out["design"]["factors"][factor.name] = factor.levels;
+  if (!table.factors.empty()) out["design"]["cells"] = cells;
+  out["by_design"] = GroupJson::array();
   for (const GroupedMeasure& one : measures) {
-    out["between_groups"].push_back(measure_json(one));
+    out["by_design"].push_back(measure_json(one));
     GroupJson* place = &out["effects"][one.measure];
     const bool several = std::ranges::any_of(measures, [&](const GroupedMeasure& other) {
       return other.measure == one.measure && other.block_name == one.block_name &&
@@ -277,20 +395,15 @@ void put_groups(const std::vector<GroupedMeasure>& measures, GroupJson& out) {
   }
 }
 
-std::string groups_text(const std::vector<GroupedMeasure>& measures) {
+std::string design_text(const std::vector<GroupedMeasure>& measures) {
   std::string text;
   for (const GroupedMeasure& one : measures) {
-    text += title_of(one) + " by group";
-    for (std::size_t i = 0; i < one.groups.size(); ++i) {
-      text += (i == 0 ? " (" : ", ") + printable(one.groups[i]) + " " +
-              std::to_string(i < one.result.anova.n.size() ? one.result.anova.n[i] : 0);
-    }
-    text += ")\n";
+    text += title_of(one) + " " + design_words(one) + " (" + sizes_text(one) + ")\n";
     if (!one.result.anova.undefined.empty()) text += "  " + one.result.anova.undefined + "\n";
     for (const GroupMarginal& mean : one.result.marginals) {
-      text += "  " + printable(one.groups[mean.group]) + ", " + condition_of(one, mean.condition) +
-              ": " + figure_text(one, mean.mean) + (one.unit.empty() ? "" : " " + one.unit) + " " +
-              figure_text(one, mean.ci95) + "\n";
+      text += "  " + (one.groups.empty() ? "" : printable(one.groups[mean.group]) + ", ") +
+              condition_of(one, mean.condition) + ": " + figure_text(one, mean.mean) +
+              (one.unit.empty() ? "" : " " + one.unit) + " " + figure_text(one, mean.ci95) + "\n";
     }
     for (const GroupEffect& effect : one.result.anova.effects)
       text += "  " + effect.name + ": " + f_test_text(effect) + "\n";
@@ -305,7 +418,7 @@ std::string groups_text(const std::vector<GroupedMeasure>& measures) {
   return text;
 }
 
-std::vector<Table> groups_tables(const std::vector<GroupedMeasure>& measures,
+std::vector<Table> design_tables(const std::vector<GroupedMeasure>& measures,
                                  const std::string& label) {
   std::vector<Table> out;
   for (const GroupedMeasure& one : measures) {
@@ -318,7 +431,7 @@ std::vector<Table> groups_tables(const std::vector<GroupedMeasure>& measures,
   return out;
 }
 
-std::string groups_conclusion(const std::vector<GroupedMeasure>& measures) {
+std::string design_conclusion(const std::vector<GroupedMeasure>& measures) {
   struct Candidate {
     const GroupedMeasure* measure;
     const GroupEffect* effect;
@@ -327,7 +440,8 @@ std::string groups_conclusion(const std::vector<GroupedMeasure>& measures) {
   std::vector<std::optional<double>> p;
   for (const GroupedMeasure& one : measures) {
     for (const GroupEffect& effect : one.result.anova.effects) {
-      if (!effect.name.starts_with("group")) continue;
+      // Without factors, those within participants are told of by themselves.
+      if (!one.crossed && !effect.name.starts_with("group")) continue;
       candidates.push_back({&one, &effect});
       p.push_back(effect.gg_p ? effect.gg_p : effect.p);
     }
@@ -338,19 +452,17 @@ std::string groups_conclusion(const std::vector<GroupedMeasure>& measures) {
   for (std::size_t i = 1; i < adjusted.size(); ++i) {
     if (adjusted[i] && (!adjusted[best] || *adjusted[i] < *adjusted[best])) best = i;
   }
-  if (!adjusted[best]) return "The groups cannot be compared.";
-  const std::string what = title_of(*candidates[best].measure);
+  const bool crossed = std::ranges::any_of(measures, &GroupedMeasure::crossed);
+  if (!adjusted[best])
+    return crossed ? "The cells of the design cannot be compared."
+                   : "The groups cannot be compared.";
   const std::string tests = std::to_string(candidates.size());
   if (*adjusted[best] >= kAlpha)
-    return "No effect of the group is clear (" + tests + " effects; the least " +
-           p_phrase(*adjusted[best]) + ", Holm).";
-  const std::string& effect = candidates[best].effect->name;
-  if (effect == "group")
-    return what + " differ between groups (" + p_phrase(*adjusted[best]) + " adjusted over " +
-           tests + " effects, Holm).";
-  return what + ": the effect of " + effect.substr(std::string("group:").size()) +
-         " differs between groups (" + p_phrase(*adjusted[best]) + " adjusted over " + tests +
-         " effects, Holm).";
+    return std::string(crossed ? "No effect of the design is clear ("
+                               : "No effect of the group is clear (") +
+           tests + " effects; the least " + p_phrase(*adjusted[best]) + ", Holm).";
+  return finding_of(title_of(*candidates[best].measure), candidates[best].effect->name) + " (" +
+         p_phrase(*adjusted[best]) + " adjusted over " + tests + " effects, Holm).";
 }
 
 }  // namespace palpate::analysis

@@ -1,0 +1,239 @@
+#include "analysis/statistics/study_design.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "analysis/statistics/task_analysis.h"
+#include "data/base/cell_name.h"
+
+namespace palpate::analysis {
+namespace {
+
+using CellValue = std::optional<double> (*)(const ParticipantCell& cell);
+
+std::optional<double> log_time(const ParticipantCell& cell) {
+  return cell.n_used > 0 ? std::optional(cell.mean_log) : std::nullopt;
+}
+
+std::optional<double> share_correct(const ParticipantCell& cell) {
+  if (cell.n_trials == 0) return std::nullopt;
+  return static_cast<double>(cell.n_correct) / static_cast<double>(cell.n_trials);
+}
+
+std::vector<WithinFactor> sizes_of(const std::vector<StudyFactor>& within) {
+  std::vector<WithinFactor> out;
+  for (const StudyFactor& factor : within) out.push_back({factor.name, factor.levels.size()});
+  return out;
+}
+
+/// The participants that the groups, if there are any, do not leave out.
+std::optional<std::size_t> known_group(const GroupLabels& labels, const std::string& participant) {
+  if (labels.names.empty()) return 0;
+  const auto known = labels.of.find(participant);
+  return known == labels.of.end() ? std::nullopt : std::optional(known->second);
+}
+
+void compare_measure(GroupedMeasure& measure) {
+  measure.result = compare_groups(
+      measure.figures, std::max<std::size_t>(1, measure.groups.size()), sizes_of(measure.within),
+      measure.crossed ? WithinContrasts::added : WithinContrasts::left_out);
+}
+
+/// The factors that these stimuli cross completely, and what they cross: the index of each cell's
+/// stimulus, the last factor's levels innermost, the plain stimuli innermost of all.
+struct CrossedStimuli {
+  std::vector<StudyFactor> factors;
+  std::vector<std::string> plain;
+  std::vector<std::size_t> cells;
+};
+
+/// none: they cross nothing, or not completely.
+std::optional<CrossedStimuli> crossed_stimuli(const std::vector<std::string>& stimuli,
+                                              const std::vector<StudyFactor>& all) {
+  CrossedStimuli out;
+  std::map<std::string, std::size_t> place;
+  std::vector<std::set<std::string>> levels(all.size());
+  for (std::size_t i = 0; i < stimuli.size(); ++i) {
+    const CellName cell = cell_name(stimuli[i]);
+    place.emplace(stimuli[i], i);
+    if (std::ranges::find(out.plain, cell.base) == out.plain.end()) out.plain.push_back(cell.base);
+    for (std::size_t f = 0; f < all.size(); ++f) {
+      if (!cell.level(all[f].name).empty()) levels[f].insert(cell.level(all[f].name));
+    }
+  }
+  std::size_t cells = out.plain.size();
+  for (std::size_t f = 0; f < all.size(); ++f) {
+    if (levels[f].empty()) continue;
+    StudyFactor& factor = out.factors.emplace_back(StudyFactor{all[f].name, {}});
+    for (const std::string& level : all[f].levels) {
+      if (levels[f].contains(level)) factor.levels.push_back(level);
+    }
+    cells *= factor.levels.size();
+  }
+  if (out.factors.empty() || cells != stimuli.size()) return std::nullopt;
+  for (std::size_t i = 0; i < cells; ++i) {
+    CellName name{out.plain[i % out.plain.size()]};
+    std::size_t rest = i / out.plain.size();
+    for (std::size_t f = out.factors.size(); f-- > 0;) {
+      const StudyFactor& factor = out.factors[f];
+      name.levels.insert(name.levels.begin(),
+                         {factor.name, factor.levels[rest % factor.levels.size()]});
+      rest /= factor.levels.size();
+    }
+    const auto at = place.find(name.text());
+    if (at == place.end()) return std::nullopt;
+    out.cells.push_back(at->second);
+  }
+  return out;
+}
+
+/// A measure of identification, by renderer, factors and shape.
+GroupedMeasure identification_by_design(const Analysis& analysis, const StudyTable& table,
+                                        CellValue value) {
+  GroupedMeasure out;
+  out.groups = table.group_labels.names;
+  out.within = {{"renderer", analysis.table.renderers}};
+  std::vector<std::size_t> shapes;
+  if (const auto crossed = crossed_stimuli(analysis.table.shapes, table.factors)) {
+    out.crossed = true;
+    out.within.insert(out.within.end(), crossed->factors.begin(), crossed->factors.end());
+    out.within.push_back({"shape", crossed->plain});
+    shapes = crossed->cells;
+  } else {
+    out.within.push_back({"shape", analysis.table.shapes});
+    for (std::size_t i = 0; i < analysis.table.shapes.size(); ++i) shapes.push_back(i);
+  }
+  for (std::size_t p = 0; p < analysis.table.participants.size(); ++p) {
+    const std::string& name = analysis.table.participants[p];
+    const auto group = known_group(table.group_labels, name);
+    if (!group) continue;
+    GroupedFigures one{name, *group, {}};
+    for (const auto& renderer : analysis.description.participant_cells) {
+      for (const std::size_t shape : shapes) one.values.push_back(value(renderer[shape][p]));
+    }
+    out.figures.push_back(std::move(one));
+  }
+  compare_measure(out);
+  return out;
+}
+
+GroupedMixedModel model_of_times(const Analysis& analysis, const GroupLabels& labels) {
+  std::vector<std::size_t> group_of;
+  for (const std::string& name : analysis.table.participants) {
+    const auto group = labels.of.find(name);
+    group_of.push_back(group == labels.of.end() ? labels.names.size() : group->second);
+  }
+  return grouped_mixed_model(analysis.description.participant_cells, analysis.table.renderers,
+                             group_of, labels.names.size());
+}
+
+/// The results of a task's measure in every cell of a block, for a plain stimulus: one result where
+/// there are no factors.
+struct MeasureOfTask {
+  std::vector<const TaskGroup*> cells;
+};
+
+/// A measure of a task, by renderer and factors; none: its cells are not crossed completely.
+std::optional<GroupedMeasure> task_by_design(const MeasureOfTask& task, const StudyTable& table) {
+  const TaskGroup& first = *task.cells.front();
+  GroupedMeasure out;
+  out.measure = first.measure;
+  out.task = first.task;
+  out.block_name = first.block_name;
+  out.shape = base_name(first.shape);
+  out.unit = first.unit;
+  out.logarithms = std::ranges::all_of(task.cells, &TaskGroup::geometric);
+  out.groups = table.group_labels.names;
+  std::vector<std::string> names, renderers;
+  for (const TaskGroup* const cell : task.cells) {
+    names.push_back(cell->shape);
+    for (const GroupMean& one : cell->renderers) {
+      if (std::ranges::find(renderers, one.renderer) == renderers.end())
+        renderers.push_back(one.renderer);
+    }
+  }
+  out.within = {{"renderer", renderers}};
+  std::vector<std::size_t> order{0};
+  if (names.size() > 1) {
+    const auto crossed = crossed_stimuli(names, table.factors);
+    if (!crossed) return std::nullopt;
+    out.crossed = true;
+    out.within.insert(out.within.end(), crossed->factors.begin(), crossed->factors.end());
+    order = crossed->cells;
+  }
+  std::map<std::string, std::size_t> row_of;
+  for (std::size_t r = 0; r < renderers.size(); ++r) {
+    for (std::size_t c = 0; c < order.size(); ++c) {
+      const TaskGroup& cell = *task.cells[order[c]];
+      const auto found = std::ranges::find(cell.renderers, renderers[r], &GroupMean::renderer);
+      if (found == cell.renderers.end()) continue;
+      for (const NamedFigure& one : found->participants) {
+        const auto group = known_group(table.group_labels, one.participant);
+        if (!group) continue;
+        const auto [row, is_new] = row_of.emplace(one.participant, out.figures.size());
+        if (is_new)
+          out.figures.push_back(
+              {one.participant, *group,
+               std::vector<std::optional<double>>(renderers.size() * order.size())});
+        out.figures[row->second].values[r * order.size() + c] =
+            out.logarithms ? std::log(one.value) : one.value;
+      }
+    }
+  }
+  compare_measure(out);
+  return out;
+}
+
+/// The measures of tasks, the cells of a stimulus in a block together.
+std::vector<MeasureOfTask> measures_of_tasks(const std::vector<TaskGroup>& groups) {
+  std::vector<MeasureOfTask> out;
+  for (const TaskGroup& group : groups) {
+    // Weber fractions would repeat the tests of the JNDs that they come from.
+    if (group.measure == "weber_fraction") continue;
+    const auto is_of = [&](const MeasureOfTask& one) {
+      const TaskGroup& known = *one.cells.front();
+      return known.measure == group.measure && known.task == group.task &&
+             known.block_name == group.block_name && !cell_name(group.shape).levels.empty() &&
+             base_name(known.shape) == base_name(group.shape);
+    };
+    const auto known = std::ranges::find_if(out, is_of);
+    if (known != out.end())
+      known->cells.push_back(&group);
+    else
+      out.push_back({{&group}});
+  }
+  return out;
+}
+
+}  // namespace
+
+std::vector<GroupedMeasure> measures_by_design(const StudyAnalysis& analysis) {
+  std::vector<GroupedMeasure> out;
+  const StudyTable& table = analysis.table;
+  if (table.group_labels.names.empty() && table.factors.empty()) return out;
+  if (analysis.identification) {
+    GroupedMeasure time = identification_by_design(*analysis.identification, table, log_time);
+    time.measure = "time";
+    time.unit = "s";
+    time.logarithms = true;
+    if (!time.crossed) time.model = model_of_times(*analysis.identification, table.group_labels);
+    GroupedMeasure accuracy =
+        identification_by_design(*analysis.identification, table, share_correct);
+    accuracy.measure = "accuracy";
+    out.push_back(std::move(time));
+    out.push_back(std::move(accuracy));
+  }
+  for (const MeasureOfTask& task : measures_of_tasks(analysis.groups)) {
+    if (auto measure = task_by_design(task, table)) out.push_back(std::move(*measure));
+  }
+  if (table.group_labels.names.empty())
+    std::erase_if(out, [](const GroupedMeasure& one) { return !one.crossed; });
+  return out;
+}
+
+}  // namespace palpate::analysis

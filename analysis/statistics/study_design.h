@@ -1,0 +1,38 @@
+#pragma once
+// The measures of a study by its design: compared between groups of participants and between the
+// cells of crossed factors. Times and accuracy of identification, and the figures of each task.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "analysis/input/study_table.h"
+#include "analysis/statistics/between_groups.h"
+#include "analysis/statistics/mixed_model.h"
+
+namespace palpate::analysis {
+
+struct StudyAnalysis;
+
+/// A measure by group and by the factors within participants.
+struct GroupedMeasure {
+  /// "time", "accuracy"; of tasks "pse", "jnd", "threshold", "exponent", "rating", ...
+  std::string measure;
+  std::string task, block_name, shape;  ///< of tasks; "": over all
+  std::string unit;                     ///< of the figures, whatever the scale; "": none
+  bool logarithms = false;              ///< natural logarithms are compared: ratios
+  std::vector<std::string> groups;      ///< the first is the reference; empty: no groups
+  /// The first is the renderer, then the factors, then, of identification, the shape; the first
+  /// level of each is the reference.
+  std::vector<StudyFactor> within;
+  bool crossed = false;                 ///< there are factors besides renderer and shape
+  std::vector<GroupedFigures> figures;  ///< of every participant, the cells of `within` in order
+  BetweenGroups result;
+  /// Of the logarithms of single times; none: another measure.
+  std::optional<GroupedMixedModel> model;
+};
+
+/// Empty: the study has neither groups nor factors.
+std::vector<GroupedMeasure> measures_by_design(const StudyAnalysis& analysis);
+
+}  // namespace palpate::analysis
