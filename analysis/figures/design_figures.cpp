@@ -85,18 +85,19 @@ std::optional<double> DesignPanel::value(const GroupedFigures& one, std::size_t 
   return back(measure, mean_of_condition(cells, within, condition(place, series)));
 }
 
-/// Spans the participants' figures and the intervals.
-FigureAxis value_axis(const DesignPanel& shown) {
-  const GroupedMeasure& measure = shown.measure;
+/// Spans the participants' figures and the intervals, in all panels alike.
+FigureAxis value_axis(const GroupedMeasure& measure, const std::vector<DesignPanel>& panels) {
   double low = std::numeric_limits<double>::infinity(), high = -low;
   const auto add = [&](double value) {
     low = std::min(low, value);
     high = std::max(high, value);
   };
-  for (const GroupedFigures& one : measure.figures) {
-    for (std::size_t x = 0; x < shown.places().size(); ++x) {
-      for (std::size_t s = 0; s < shown.series().size(); ++s) {
-        if (const auto value = shown.value(one, x, s)) add(*value);
+  for (const DesignPanel& shown : panels) {
+    for (const GroupedFigures& one : measure.figures) {
+      for (std::size_t x = 0; x < shown.places().size(); ++x) {
+        for (std::size_t s = 0; s < shown.series().size(); ++s) {
+          if (const auto value = shown.value(one, x, s)) add(*value);
+        }
       }
     }
   }
@@ -208,12 +209,13 @@ std::vector<Figure> between_figures(const StudyAnalysis& analysis) {
     if (!continues) figures.push_back(begin_figure(analysis, measure, figures.size() + 1));
     before = &measure;
     Figure& figure = figures.back();
-    for (const DesignPanel& shown : panels_of(measure)) {
+    const std::vector<DesignPanel> panels = panels_of(measure);
+    for (const DesignPanel& shown : panels) {
       Panel panel;
       panel.title = axis_title(measure);
       panel.x = names_axis(shown.places(), shown.places().size(),
                            shown.places_groups ? "group" : printable(shown.levels().name));
-      panel.y = value_axis(shown);
+      panel.y = value_axis(measure, panels);
       panel.width = 110 + 110 * static_cast<double>(shown.places().size());
       panel.height = 260;
       add_people(panel, shown);

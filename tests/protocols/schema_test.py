@@ -22,7 +22,7 @@ PROGRAM_ONLY = {
     "v2-level-of-another-shape", "v2-level-out-of-range",
     "v2-names-alike", "v2-order-of-an-adaptive-block", "v2-order-without-solution", "v2-page-before-unknown-block",
     "v2-renderer-not-of-the-protocol", "v2-same-different-of-three", "v2-scale-falls", "v2-sessions-in-order",
-    "v2-first-session", "v2-groups-patched", "v2-no-time-to-answer", "v2-picture-damaged", "v2-picture-files", "v2-practice-counts", "v2-standard-without-the-number", "v2-too-many-trials", "v2-two-keys", "v2-unknown-stimuli",
+    "v2-factors-crossed", "v2-first-session", "v2-groups-patched", "v2-no-time-to-answer", "v2-picture-damaged", "v2-picture-files", "v2-practice-counts", "v2-standard-without-the-number", "v2-too-many-trials", "v2-two-keys", "v2-unknown-stimuli",
 }
 # The same for sweep spaces and studies.
 SPACES_PROGRAM_ONLY = {"limits-in-order", "names-twice", "normal-far-away", "values-set-twice"}
