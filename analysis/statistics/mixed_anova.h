@@ -1,7 +1,7 @@
 #pragma once
 // Analysis of variance with one factor between participants (the group), or none, and any number
-// within them, on one value per participant and cell. Type III: effects are of unweighted means, so groups of
-// unequal size do not shift those within participants. As R's afex::aov_car(type = 3).
+// within them, on one value per participant and cell. Type III: effects are of unweighted means, so
+// groups of unequal size do not shift those within participants. As R's afex::aov_car(type = 3).
 
 #include <cstddef>
 #include <optional>
