@@ -7,6 +7,7 @@
 #include <set>
 #include <system_error>
 
+#include "data/base/cell_name.h"
 #include "protocols/json_document.h"
 
 namespace palpate::protocols {
@@ -19,9 +20,21 @@ constexpr std::size_t kLongestLabel = 80;  // bytes
 /// A text of the protocol; a label is shown below a key, in one line.
 struct TextPlace {
   std::string key;
-  std::string* text;
+  std::vector<std::string*> copies;  ///< equal; several where a block is shown in parts
   bool label = false;
+
+  const std::string& text() const { return *copies.front(); }
 };
+
+/// "surface=wet,size=large": the levels of a block that is one cell; "": of any other.
+std::string cell_of(const Protocol& protocol, const TaskBlock& block) {
+  if (!block.cell || block.stimuli.empty()) return "";
+  const auto& stimulus = protocol.stimuli[static_cast<std::size_t>(block.stimuli.front())];
+  std::string levels;
+  for (const auto& [factor, level] : cell_name(stimulus.name).levels)
+    levels += (levels.empty() ? "" : ",") + factor + "=" + level;
+  return levels;
+}
 
 class TextPlaces {
  public:
@@ -31,7 +44,7 @@ class TextPlaces {
       add_labels(protocol);
     } else {
       add_task_texts(protocol.texts);
-      for (TaskBlock& block : protocol.blocks) add_block(block);
+      for (TaskBlock& block : protocol.blocks) add_block(protocol, block);
       for (PageSpec& page : protocol.pages) add_page(page);
     }
   }
@@ -39,7 +52,7 @@ class TextPlaces {
 
  private:
   void add(const std::string& key, std::string& text, bool label = false) {
-    if (!text.empty()) places_.push_back({key, &text, label});
+    if (!text.empty()) places_.push_back({key, {&text}, label});
   }
   void add_texts(Protocol::Texts& texts) {
     add("texts.instructions", texts.instructions);
@@ -68,17 +81,32 @@ class TextPlaces {
       add("response.keys." + stimulus, label, true);
     }
   }
-  void add_block(TaskBlock& block) {
-    const std::string head = "blocks." + block.name + ".";
-    add(head + "instructions", block.instructions);
-    add(head + "question", block.question);
+  /// Adds a text that the cells of a block share, or one that a cell has of its own.
+  void add_in_cell(const std::string& head, const std::string& cell, const std::string& rest,
+                   std::string& text, bool label = false) {
+    const auto known = std::ranges::find(places_, head + rest, &TextPlace::key);
+    if (known == places_.end()) {
+      add(head + rest, text, label);
+    } else if (known->text() == text) {
+      known->copies.push_back(&text);
+    } else {
+      add(head + cell + "." + rest, text, label);
+    }
+  }
+  void add_block(const Protocol& protocol, TaskBlock& block) {
+    const std::string head = "blocks." + block.name + ".", cell = cell_of(protocol, block);
+    const auto add_own = [&](const std::string& rest, std::string& text, bool label = false) {
+      add_in_cell(head, cell, rest, text, label);
+    };
+    add_own("instructions", block.instructions);
+    add_own("question", block.question);
     const char* const kind = block.task == TaskKind::rate ? "scale." : "keys.";
-    for (TaskAnswer& answer : block.answers) add(head + kind + answer.name, answer.label, true);
+    for (TaskAnswer& answer : block.answers) add_own(kind + answer.name, answer.label, true);
     if (!block.confidence) return;
-    add(head + "confidence.question", block.confidence->question);
+    add_own("confidence.question", block.confidence->question);
     std::size_t step = 0;
     for (ScaleStep& one : block.confidence->scale)
-      add(head + "confidence.scale." + std::to_string(++step), one.label, true);
+      add_own("confidence.scale." + std::to_string(++step), one.label, true);
   }
   void add_page(PageSpec& page) {
     const std::string head = "pages." + page.name + ".";
@@ -106,7 +134,7 @@ std::string group_of(const std::string& key) { return key.substr(0, key.rfind('.
 void check_translation(const TextPlace& place, const json& value, FaultList& faults) {
   const std::string pointer = child_pointer("", place.key);
   if (!value.is_string() || value.get_ref<const std::string&>().empty()) {
-    faults.add(pointer, "expected the translation of '" + place.text->substr(0, 60) + "'" +
+    faults.add(pointer, "expected the translation of '" + place.text().substr(0, 60) + "'" +
                             found_text(value));
   } else if (place.label && !is_one_line(value.get_ref<const std::string&>())) {
     faults.add(pointer,
@@ -160,7 +188,7 @@ void check_translations(const Protocol& protocol, const json& given, FaultList& 
     const auto value = given.find(place.key);
     if (value == given.end()) {
       faults.add(child_pointer("", place.key),
-                 "expected the translation of '" + place.text->substr(0, 60) + "': it is missing");
+                 "expected the translation of '" + place.text().substr(0, 60) + "': it is missing");
       continue;
     }
     check_translation(place, *value, faults);
@@ -175,7 +203,7 @@ void check_translations(const Protocol& protocol, const json& given, FaultList& 
 void put_translations(Protocol& protocol, const std::string& language, const std::string& text,
                       const json& given) {
   for (const TextPlace& place : TextPlaces(protocol).take())
-    *place.text = given[place.key].get<std::string>();
+    for (std::string* text : place.copies) *text = given[place.key].get<std::string>();
   protocol.language = language;
   protocol.translation = text;
 }
@@ -185,7 +213,8 @@ void put_translations(Protocol& protocol, const std::string& language, const std
 std::vector<std::pair<std::string, std::string>> texts_of(const Protocol& protocol) {
   Protocol copy = protocol;
   std::vector<std::pair<std::string, std::string>> texts;
-  for (const TextPlace& place : TextPlaces(copy).take()) texts.emplace_back(place.key, *place.text);
+  for (const TextPlace& place : TextPlaces(copy).take())
+    texts.emplace_back(place.key, place.text());
   return texts;
 }
 

@@ -80,6 +80,34 @@ TEST(Texts, AreAllReplacedButStoredAnswersStay) {
   EXPECT_EQ(protocol.blocks[0].answers[1].label, "T blocks.constant.keys.2");
 }
 
+TEST(Texts, OfACellAreItsOwnWhereItsLevelSetsThem) {
+  const std::string path = PALPATE_SOURCE_DIR "/tests/protocols/good/everything-v2.json";
+  std::ifstream in(path);
+  json document = json::parse(in);
+  document["factors"][0]["levels"][1]["set"]["/block/question"] = "Is the wet one there?";
+  for (json& block : document["blocks"]) {
+    if (block["name"] == "find") block["question"] = "Is it there?";
+  }
+  Protocol protocol = parse_protocol_text(document.dump(), path);
+  json texts = json::parse(texts_json(protocol));
+  EXPECT_EQ(texts["blocks.find.question"], "Is it there?");
+  const std::string own = "blocks.find.surface=wet.question";
+  ASSERT_TRUE(texts.contains(own)) << texts.dump(1);
+  texts["blocks.find.question"] = "Ist es da?";
+  texts[own] = "Ist das nasse da?";
+  texts["blocks.find.keys.yes"] = "ja";
+  translate(protocol, "de", texts.dump(), "texts.de.json");
+  int dry = 0, wet = 0;
+  for (const TaskBlock& block : protocol.blocks) {
+    if (block.name != "find") continue;
+    dry += block.question == "Ist es da?";
+    wet += block.question == "Ist das nasse da?";
+    EXPECT_EQ(block.answers.front().label, "ja");
+  }
+  EXPECT_EQ(dry, 1);
+  EXPECT_EQ(wet, 1);
+}
+
 TEST(Texts, NameEveryMissingUnknownOrWrongKey) {
   json texts = json::parse(texts_json(everything()));
   EXPECT_TRUE(faults_of(texts.dump()).empty());
