@@ -259,15 +259,6 @@ void drop_missing_answers(std::vector<StudyTrial>& trials) {
   }
 }
 
-/// The procedures of a protocol, and its title if the trials are of it.
-void put_protocol(const std::string& sha256, const std::string& text, const std::string& path,
-                  StudyTable& table) {
-  add_procedures(sha256, text, path, table);
-  const bool used = std::ranges::any_of(table.protocols,
-                                        [&](const auto& known) { return known.second == sha256; });
-  if (used && table.title.empty()) table.title = data::read_stored_protocol(text).title;
-}
-
 /// Adds factors with their levels, each once.
 void note_factors(const std::vector<data::StoredFactor>& more, StudyTable& table) {
   for (const data::StoredFactor& factor : more) {
@@ -297,6 +288,42 @@ void note_factors_of_trials(StudyTable& table) {
     }
   }
   note_factors(found, table);
+}
+
+/// Adds the procedures of a protocol, for each of its groups.
+void add_procedures(const std::string& sha256, const std::string& text, const std::string& path,
+                    StudyTable& table) {
+  for (const auto& [group, patched] : protocols::texts_of_groups(text))
+    table.procedures[procedures_key(sha256, group)] =
+        protocols::procedures_of_blocks(patched, path);
+}
+
+/// Sets the groups of the participants from the trials, and what there is to say of them.
+/// \param names  the groups in the protocol's order; others follow as they come
+void label_groups(const std::vector<std::string>& names, StudyTable& table) {
+  GroupLabels& labels = table.group_labels;
+  const std::vector<std::string> came = std::exchange(labels, {}).names;
+  labels.names = names;
+  for (const std::string& name : came) note_once(name, labels.names);
+  Interner without;
+  for (const StudyTrial& trial : table.trials) {
+    if (trial.group.empty())
+      without.number(trial.participant);
+    else
+      labels.add(trial.participant, trial.group);
+  }
+  if (labels.of.empty()) {
+    labels.names.clear();
+    return;
+  }
+  Interner all;
+  for (const std::string& name : labels.names) all.number(name);
+  warn_of_alike("Groups", all.names(), table.warnings);
+  if (without.names().empty()) return;
+  std::string text;
+  for (const std::string& name : without.names()) text += (text.empty() ? "" : ", ") + name;
+  table.warnings.push_back("Without a group, and left out of the comparison of groups: " + text +
+                           ".");
 }
 
 void warn_of_alike_names(StudyTable& table) {
@@ -415,17 +442,9 @@ StudyTable read_tasks_csv(const std::string& path, const std::vector<std::string
                       "expected at least one trial that is not practice" +
                           (wanted.empty() ? "" : " of the protocol " + wanted.front())});
   if (!faults.empty()) throw protocols::InputError(std::move(faults));
-  for (const ProtocolText& one : protocols) put_protocol(one.sha256, one.text, path, table);
-  std::vector<std::string> groups;
-  for (const ProtocolText& one : protocols) {
-    const data::StoredProtocol stored = data::read_stored_protocol(one.text);
-    for (const std::string& name : stored.groups.names) note_once(name, groups);
-    note_factors(stored.factors, table);
-  }
-  label_groups(groups, table);
+  put_protocols(protocols, path, table);
   if (numbered) order_trials(table.trials);
   drop_missing_answers(table.trials);
-  note_factors_of_trials(table);
   warn_of_alike_names(table);
   torque.warn(table.warnings);
   return table;
@@ -477,14 +496,12 @@ StudyTable read_tasks_store(data::Store& store, const std::string& protocol) {
       note_once(stored.run.observer_sha256, observers);
     }
   });
-  std::vector<std::string> group_names;
+  std::vector<ProtocolText> protocols;
   for (const data::ProtocolInfo& one : store.protocols()) {
-    if (!is_protocol(protocol, one.name, one.sha256)) continue;
-    put_protocol(one.sha256, one.text, path, table);
-    const data::StoredProtocol stored = data::read_stored_protocol(one.text);
-    for (const std::string& name : stored.groups.names) note_once(name, group_names);
-    note_factors(stored.factors, table);
+    if (is_protocol(protocol, one.name, one.sha256))
+      protocols.push_back({one.name, one.sha256, one.text, "", ""});
   }
+  put_protocols(protocols, path, table);
   table.people = data::participant_columns(store);
   std::set<std::string> shown;
   for (const StudyTrial& trial : table.trials) shown.insert(trial.participant);
@@ -497,9 +514,7 @@ StudyTable read_tasks_store(data::Store& store, const std::string& protocol) {
         {{path, "trials",
           "expected at least one completed trial that is not practice" +
               (protocol.empty() ? "" : " of the protocol " + printable(protocol))}});
-  note_factors_of_trials(table);
   warn_of_alike_names(table);
-  label_groups(group_names, table);
   torque.warn(table.warnings);
   return table;
 }
@@ -533,37 +548,20 @@ std::string procedures_key(const std::string& protocol_sha256, const std::string
   return group.empty() ? protocol_sha256 : protocol_sha256 + "/" + group;
 }
 
-void add_procedures(const std::string& sha256, const std::string& text, const std::string& path,
-                    StudyTable& table) {
-  for (const auto& [group, patched] : protocols::texts_of_groups(text))
-    table.procedures[procedures_key(sha256, group)] =
-        protocols::procedures_of_blocks(patched, path);
-}
-
-void label_groups(const std::vector<std::string>& names, StudyTable& table) {
-  GroupLabels& labels = table.group_labels;
-  const std::vector<std::string> came = std::exchange(labels, {}).names;
-  labels.names = names;
-  for (const std::string& name : came) note_once(name, labels.names);
-  Interner without;
-  for (const StudyTrial& trial : table.trials) {
-    if (trial.group.empty())
-      without.number(trial.participant);
-    else
-      labels.add(trial.participant, trial.group);
+void put_protocols(const std::vector<ProtocolText>& protocols, const std::string& path,
+                   StudyTable& table) {
+  std::vector<std::string> groups;
+  for (const ProtocolText& one : protocols) {
+    add_procedures(one.sha256, one.text, path, table);
+    const data::StoredProtocol stored = data::read_stored_protocol(one.text);
+    const bool used = std::ranges::any_of(
+        table.protocols, [&](const auto& known) { return known.second == one.sha256; });
+    if (used && table.title.empty()) table.title = stored.title;
+    for (const std::string& name : stored.groups.names) note_once(name, groups);
+    note_factors(stored.factors, table);
   }
-  if (labels.of.empty()) {
-    labels.names.clear();
-    return;
-  }
-  Interner all;
-  for (const std::string& name : labels.names) all.number(name);
-  warn_of_alike("Groups", all.names(), table.warnings);
-  if (without.names().empty()) return;
-  std::string text;
-  for (const std::string& name : without.names()) text += (text.empty() ? "" : ", ") + name;
-  table.warnings.push_back("Without a group, and left out of the comparison of groups: " + text +
-                           ".");
+  label_groups(groups, table);
+  note_factors_of_trials(table);
 }
 
 StudyTrial study_trial_of(const std::string& participant, const data::TrialRecord& record) {

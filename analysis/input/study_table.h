@@ -55,13 +55,10 @@ struct StudyTable {
 /// The protocol of a group, by its SHA-256 and the group's name; "": without groups.
 std::string procedures_key(const std::string& protocol_sha256, const std::string& group);
 
-/// Adds the procedures of a protocol's text, for each of its groups.
-void add_procedures(const std::string& sha256, const std::string& text, const std::string& path,
-                    StudyTable& table);
-
-/// Sets the groups of the participants from the trials, and what there is to say of them.
-/// \param names  the groups in the protocol's order; others follow as they come
-void label_groups(const std::vector<std::string>& names, StudyTable& table);
+/// Adds to trials what their protocols say of them: procedures, title, groups and factors.
+/// \param path  of the source, for messages
+void put_protocols(const std::vector<ProtocolText>& protocols, const std::string& path,
+                   StudyTable& table);
 
 /// Reads an export of trials. Those of tasks need participant_id, task, renderer and shape; level,
 /// standard_level, success, number, confidence, ... are optional. Those of a study of shapes: see

@@ -227,8 +227,7 @@ class Parser {
   }
 
   Node name_or_function(std::size_t place) {
-    while (at_ < text_.size() && (is_in_word(at_) || (text_[at_] == '.' && is_in_word(at_ + 1))))
-      ++at_;
+    while (is_in_word(at_) || (joins_words(at_) && is_in_word(at_ + 1))) ++at_;
     const std::string name = text_.substr(place, at_ - place);
     skip_space();
     if (at_ < text_.size() && text_[at_] == '(') return function(name, place);
@@ -289,9 +288,10 @@ class Parser {
 
   /// The name, in quotes if needed.
   static std::string as_written(const std::string& name) {
-    bool plain = !name.empty() && is_letter(name[0]) && name.back() != '.';
+    bool plain = !name.empty() && is_letter(name[0]) && !is_joint(name.back());
     for (std::size_t i = 0; plain && i < name.size(); ++i)
-      plain = is_letter(name[i]) || is_digit(name[i]) || (name[i] == '.' && name[i + 1] != '.');
+      plain = is_letter(name[i]) || is_digit(name[i]) ||
+              (is_joint(name[i]) && i + 1 < name.size() && !is_joint(name[i + 1]));
     if (plain) return name;
     const char mark = name.find('\'') == std::string::npos ? '\'' : '"';
     return mark + name + mark;
@@ -308,6 +308,10 @@ class Parser {
   bool is_in_word(std::size_t place) const {
     return place < text_.size() && (is_letter(text_[place]) || is_digit(text_[place]));
   }
+  bool joins_words(std::size_t place) const {
+    return place < text_.size() && is_joint(text_[place]);
+  }
+  static bool is_joint(char c) { return c == '.' || c == ':'; }
   static bool is_digit(char c) { return c >= '0' && c <= '9'; }
   static bool is_letter(char c) {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || c == '_';

@@ -12,7 +12,7 @@
 //   product := sign { ("*" | "/") sign }
 //   sign    := "-" sign | atom
 //   atom    := number | name | ("min" | "max") "(" or { "," or } ")" | "abs" "(" or ")" | "(" or ")"
-//   name    := word { "." word }; or any text in ' or "
+//   name    := word { ("." | ":") word }; or any text in ' or "
 //   word    := letters, digits and _; the first one does not begin with a digit
 // clang-format on
 

@@ -7,7 +7,9 @@
 
 #include "analysis/report/plan_report.h"
 #include "analysis/text.h"
+#include "data/base/cell_name.h"
 #include "data/base/text.h"
+#include "protocols/factors.h"
 #include "protocols/procedures/procedure.h"
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
@@ -60,7 +62,7 @@ std::size_t trials_of(const TaskBlock& block) {
   return static_cast<std::size_t>(std::max(1L, std::lround(trials)));
 }
 
-/// Identification: trials with a renderer, of one shape or of all.
+/// Identification: trials with a renderer in a cell of the factors, of one shape or of all.
 std::size_t trials_of_identification(const Protocol& protocol, const std::vector<int>& blocks,
                                      bool of_one_shape) {
   std::size_t trials = 0;
@@ -68,7 +70,9 @@ std::size_t trials_of_identification(const Protocol& protocol, const std::vector
   for (const int index : blocks) {
     const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
     if (std::ranges::find(block.renderers, kind) == block.renderers.end()) continue;
-    trials += trials_of(block) * (of_one_shape ? 1 : block.stimuli.size());
+    if (block.cell.value_or(0) > 0) continue;
+    const std::size_t cells = block.cell ? 1 : protocols::cells_of(block);
+    trials += trials_of(block) * (of_one_shape ? 1 : block.stimuli.size() / cells);
   }
   return trials;
 }
@@ -111,7 +115,7 @@ std::vector<std::string> identified(const Protocol& protocol, const std::vector<
   std::set<std::string> names;
   for (const int index : blocks) {
     for (const int stimulus : protocol.blocks[static_cast<std::size_t>(index)].stimuli)
-      names.insert(protocol.stimuli[static_cast<std::size_t>(stimulus)].name);
+      names.insert(base_name(protocol.stimuli[static_cast<std::size_t>(stimulus)].name));
   }
   return {names.begin(), names.end()};
 }
@@ -176,12 +180,28 @@ void require_possible(const analysis::PlanRecord& plan, const std::string& path,
   }
 }
 
+/// The stimuli at the first level of a factor that a block shows, and those in no cell of it.
+/// \param cells  blocks and stimuli
+std::set<int> at_first_level(const Protocol& protocol, const std::string& factor,
+                             const std::set<std::pair<int, int>>& cells) {
+  std::set<int> out;
+  std::string first;
+  for (const auto& [block, stimulus] : cells) {
+    const std::string level =
+        cell_name(protocol.stimuli[static_cast<std::size_t>(stimulus)].name).level(factor);
+    if (first.empty()) first = level;
+    if (level.empty() || level == first) out.insert(stimulus);
+  }
+  return out;
+}
+
 }  // namespace
 
 bool PlannedConditions::is_second(const protocols::Trial& trial) const {
   if (!differ) return false;
   if (by_renderer) return trial.renderer == protocols::RendererKind::ray;
-  return trial.task_block != blocks.front() || trial.stimulus != first_stimulus;
+  if (!factor.empty()) return !first_stimuli.contains(trial.stimulus);
+  return trial.task_block != blocks.front() || !first_stimuli.contains(trial.stimulus);
 }
 
 PlannedConditions conditions_of(const Protocol& protocol, const analysis::PlanRecord& plan) {
@@ -194,13 +214,18 @@ PlannedConditions conditions_of(const Protocol& protocol, const analysis::PlanRe
     const std::vector<std::string> names = measures_of(protocol, block);
     if (block.practice || std::ranges::find(names, measure) == names.end()) continue;
     const auto index = static_cast<int>(i);
-    if (out.blocks.empty()) out.first_stimulus = block.stimuli.front();
+    if (out.blocks.empty()) out.first_stimuli = {block.stimuli.front()};
+    if (out.factor.empty() && !block.factors.empty())
+      out.factor = protocol.factors[block.factors.front().factor].name;
     out.blocks.push_back(index);
     renderers.insert(block.renderers.begin(), block.renderers.end());
     for (const int stimulus : block.stimuli) cells.emplace(index, stimulus);
   }
   out.by_renderer = renderers.size() > 1;
-  out.differ = out.by_renderer || (cells.size() > 1 && !is_of_identification(plan));
+  if (out.by_renderer) out.factor.clear();
+  if (!out.factor.empty()) out.first_stimuli = at_first_level(protocol, out.factor, cells);
+  out.differ =
+      out.by_renderer || !out.factor.empty() || (cells.size() > 1 && !is_of_identification(plan));
   return out;
 }
 

@@ -3,6 +3,7 @@
 // differ.
 
 #include <cstddef>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -14,10 +15,12 @@ namespace palpate::runner::registration {
 
 struct PlannedConditions {
   std::vector<int> blocks;  ///< indices; empty: no block gives the measure
-  /// The second condition is the ray; otherwise every stimulus and block but the first one.
+  /// The second condition is the ray; else every level but the first one of a factor; else every
+  /// stimulus and block but the first one.
   bool by_renderer = false;
-  bool differ = false;     ///< there are two conditions
-  int first_stimulus = 0;  ///< index into Protocol::stimuli, of the first block
+  std::string factor;           ///< the first one that a block crosses; "": none, or by renderer
+  bool differ = false;          ///< there are two conditions
+  std::set<int> first_stimuli;  ///< of the first condition, where it is not a renderer's
 
   /// Whether a trial of these blocks is of the second condition.
   bool is_second(const protocols::Trial& trial) const;

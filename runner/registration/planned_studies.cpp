@@ -16,6 +16,7 @@
 #include "analysis/statistics/jobs.h"
 #include "analysis/statistics/power.h"
 #include "analysis/statistics/task_analysis.h"
+#include "data/base/cell_name.h"
 #include "data/base/random.h"
 #include "data/export/csv.h"
 #include "data/store/store.h"
@@ -357,7 +358,8 @@ participants::JudgementSettings PlannedTasks::of_measure(const ThresholdStudy& s
 participants::JudgementSettings PlannedTasks::of_times(const analysis::StudyModel& model,
                                                        const protocols::Trial& trial,
                                                        Random& person) const {
-  const std::string& name = protocol_.stimuli[static_cast<std::size_t>(trial.stimulus)].name;
+  const std::string name =
+      base_name(protocol_.stimuli[static_cast<std::size_t>(trial.stimulus)].name);
   const auto shape =
       static_cast<std::size_t>(std::ranges::find(model.shapes, name) - model.shapes.begin());
   // The participant's gains are drawn first; the last trial of the list is this one.
@@ -429,8 +431,6 @@ std::string PlannedTasks::analyzed(std::size_t study, bool with_effect) const {
   analysis::StudyTable table;
   table.simulated = true;
   table.protocols = {{made_.protocol.name, made_.protocol.sha256}};
-  analysis::add_procedures(made_.protocol.sha256, made_.protocol.source_text, "protocol.json",
-                           table);
   // No figure with a name depends on simulated goodness of fit, which takes most of the time.
   session::simulate_in_memory(
       protocol_, settings_, static_cast<int>(made_.participants), made_.seed + study, {},
@@ -444,7 +444,9 @@ std::string PlannedTasks::analyzed(std::size_t study, bool with_effect) const {
         trial.simulated = true;
       },
       judgement(study, with_effect));
-  analysis::label_groups(made_.protocol.groups.names, table);
+  const protocols::Protocol& own = made_.protocol;
+  analysis::put_protocols({{own.name, own.sha256, own.source_text, "", ""}}, "protocol.json",
+                          table);
   return analyzed(std::move(table), 0);
 }
 

@@ -7,6 +7,7 @@
 #include "analysis/report/plan_report.h"
 #include "analysis/statistics/paired.h"
 #include "analysis/text.h"
+#include "data/base/cell_name.h"
 #include "protocols/groups.h"
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
@@ -67,6 +68,11 @@ Kinds kinds_of(const protocols::Protocol& protocol) {
   return out;
 }
 
+/// The cells of a block have one name.
+void add_once(const std::string& name, std::vector<std::string>& names) {
+  if (std::ranges::find(names, name) == names.end()) names.push_back(name);
+}
+
 /// What the participant does.
 std::string question_of(TaskKind task) {
   switch (task) {
@@ -108,7 +114,12 @@ class TaskAnswers final : public StudyAnswers {
       out +=
           " MEASURE.BLOCK.ratio (or .difference) compares the ray with the point within "
           "participants.";
-    if (conditions_.differ && !conditions_.by_renderer)
+    if (!protocol_.factors.empty())
+      out +=
+          " effects.MEASURE.BLOCK.EFFECT has f, num_df, den_df, p and generalized_eta_squared of "
+          "an effect such as " +
+          example_of_effect() + ".";
+    if (compares_blocks())
       out +=
           " between.MEASURE.BLOCK.OTHER compares block OTHER with BLOCK within participants (of "
           "ratings between.rating.BLOCK.STIMULUS.OTHER).";
@@ -125,7 +136,7 @@ class TaskAnswers final : public StudyAnswers {
   std::string feedback() const override {
     std::vector<std::string> with;
     for (const TaskBlock* block : blocks_) {
-      if (block->feedback) with.push_back(block->name);
+      if (block->feedback) add_once(block->name, with);
     }
     if (with.empty()) return "";
     return "In " + blocks_in_words(with) +
@@ -136,8 +147,9 @@ class TaskAnswers final : public StudyAnswers {
     std::vector<Paragraph> out;
     std::string factors = "renderer (" + joined(renderers_) + ")";
     if (renderers_.size() < 2) factors = "one renderer, " + renderers_.front();
-    out.push_back(text("Within participants, " + counted(blocks_.size(), "block", "blocks") +
-                       " of trials; " + factors +
+    out.push_back(text("Within participants, " +
+                       counted(names_of_blocks().size(), "block", "blocks") + " of trials; " +
+                       factors +
                        ". In each trial the participant feels one or more objects through the "
                        "stylus, unseen, and answers."));
     for (const TaskBlock* block : blocks_) out.push_back(item(block_in_words(*block)));
@@ -157,7 +169,7 @@ class TaskAnswers final : public StudyAnswers {
     std::vector<Paragraph> out;
     std::vector<std::string> fixed, adaptive;
     for (const TaskBlock* block : blocks_)
-      (protocols::is_adaptive(*block) ? adaptive : fixed).push_back(block->name);
+      add_once(block->name, protocols::is_adaptive(*block) ? adaptive : fixed);
     const std::string turns = protocol_.orientation == protocols::OrientationKind::uniform
                                   ? "Each object is turned at random (uniform over all rotations)."
                               : protocol_.orientation == protocols::OrientationKind::listed
@@ -226,23 +238,26 @@ class TaskAnswers final : public StudyAnswers {
     std::map<std::string, std::vector<std::string>> varied;  // blocks by what varies
     for (const TaskBlock* block : blocks_) {
       if (block->level)
-        varied[protocols::level_name(block->level->pointer) + " of the stimulus" +
-               (unit_of(*block).empty() ? "" : " (" + unit_of(*block) + ")")]
-            .push_back(block->name);
+        add_once(block->name,
+                 varied[protocols::level_name(block->level->pointer) + " of the stimulus" +
+                        (unit_of(*block).empty() ? "" : " (" + unit_of(*block) + ")")]);
     }
     for (const auto& [level, names] : varied)
       out.push_back(item("level: " + level + ", in " + blocks_in_words(names) +
                          "; the levels are in question 6."));
+    for (const protocols::Factor& factor : protocol_.factors)
+      out.push_back(item(levels_of(factor)));
     std::set<std::string> shown;
     for (const TaskBlock* block : blocks_) {
       for (const int stimulus : block->stimuli)
-        shown.insert(protocol_.stimuli[static_cast<std::size_t>(stimulus)].name);
+        shown.insert(base_name(protocol_.stimuli[static_cast<std::size_t>(stimulus)].name));
     }
     if (shown.size() > 1)
       out.push_back(
           item("stimulus: " + joined(std::vector<std::string>(shown.begin(), shown.end())) +
                "; sizes and materials are in the protocol."));
-    if (blocks_.size() > 1) out.push_back(item("block: " + joined(names_of_blocks()) + "."));
+    if (names_of_blocks().size() > 1)
+      out.push_back(item("block: " + joined(names_of_blocks()) + "."));
     if (out.empty()) out.push_back(text("Nothing: one stimulus is shown in one condition."));
     return out;
   }
@@ -318,13 +333,19 @@ class TaskAnswers final : public StudyAnswers {
           text("Times of identification: for each shape a paired t-test over participants "
                "on d = mean log time with the ray - mean log time with the point."));
     }
-    if (conditions_.differ && !conditions_.by_renderer)
+    if (compares_blocks())
       out.push_back(text(
           "Blocks and stimuli are compared by the paired t-test of the participants' "
           "own figures" +
           std::string(kinds_.functions() ? " from single fits; undetermined fits are left out and "
                                            "counted."
                                          : ".")));
+    if (!protocol_.factors.empty())
+      out.push_back(
+          text("Factors: an analysis of variance of the participants' values in each cell, "
+               "with repeated measures (type III; groups, if any, between participants); levels "
+               "are compared by paired t-tests of the participants' means over the other factors. "
+               "Participants without a value in a cell are left out and counted."));
     if (made_.plan.measure() != nullptr && made_.plan.measure()->bound)
       out.push_back(
           text("Equivalence: two one-sided tests at 5 %, that is, the 90 % interval lies "
@@ -358,6 +379,8 @@ class TaskAnswers final : public StudyAnswers {
   std::vector<Paragraph> inference() const override {
     std::string family = "p values are adjusted by Holm's method over the comparisons of a measure";
     if (kinds_.rate) family += " (of ratings, over all of a block)";
+    if (!protocol_.factors.empty() || protocol_.groups.any())
+      family += "; those of effects of an analysis of variance are not";
     return {text("Two-sided tests with alpha = " + plain(made_.alpha) + ". " + family +
                  ". Hypotheses are judged by their conditions (question 2); there is no adjustment "
                  "over hypotheses.")};
@@ -409,6 +432,9 @@ class TaskAnswers final : public StudyAnswers {
         "conditions can show, not what people will do. So few studies tell a share of verdicts "
         "only roughly: its standard error is up to " +
         plain(std::round(50 / std::sqrt(static_cast<double>(studies())))) + " %.";
+    if (!conditions_.factor.empty())
+      out += " The planned effect is between the first level of the factor " + conditions_.factor +
+             " and each other one; the other factors have none.";
     if (made_.typical_time > 0)
       out += " A typical time of " + plain(std::round(10 * made_.typical_time) / 10) +
              " s was assumed for identification.";
@@ -449,8 +475,37 @@ class TaskAnswers final : public StudyAnswers {
 
   std::vector<std::string> names_of_blocks() const {
     std::vector<std::string> out;
-    for (const TaskBlock* block : blocks_) out.push_back(block->name);
+    for (const TaskBlock* block : blocks_) add_once(block->name, out);
     return out;
+  }
+
+  /// Whether the analysis compares blocks or stimuli, for want of another condition.
+  bool compares_blocks() const {
+    return conditions_.differ && !conditions_.by_renderer && conditions_.factor.empty();
+  }
+
+  /// "surface:size"
+  std::string example_of_effect() const {
+    const std::string& first = protocol_.factors.front().name;
+    return protocol_.factors.size() < 2 ? first : first + ":" + protocol_.factors[1].name;
+  }
+
+  /// "factor surface (smooth, rough), in block stiffness: cells mixed."
+  std::string levels_of(const protocols::Factor& factor) const {
+    std::vector<std::string> levels, mixed, apart;
+    for (const protocols::FactorLevel& level : factor.levels) levels.push_back(level.name);
+    for (const TaskBlock* block : blocks_) {
+      for (const protocols::CrossedFactor& crossed : block->factors) {
+        if (&protocol_.factors[crossed.factor] == &factor)
+          add_once(block->name, block->cells_apart ? apart : mixed);
+      }
+    }
+    std::string out = "factor " + factor.name + " (" + joined(levels) + ")";
+    if (!mixed.empty()) out += "; trials mixed in " + blocks_in_words(mixed);
+    if (!apart.empty())
+      out += "; one cell after the other, in the order of a Williams' square, in " +
+             blocks_in_words(apart);
+    return out + "; what each level sets is in the protocol.";
   }
 
   static std::string blocks_in_words(const std::vector<std::string>& names) {
@@ -490,7 +545,7 @@ class TaskAnswers final : public StudyAnswers {
   }
 
   std::string order_of_blocks() const {
-    if (blocks_.size() == 1) return "there is one.";
+    if (names_of_blocks().size() == 1) return "there is one.";
     const int orders = protocols::block_orders(protocol_);
     if (orders < 2) return "the same for everybody: " + study::condition_order(protocol_, 1) + ".";
     return "counterbalanced over participant numbers within a session (balanced Latin square; it "
@@ -502,7 +557,7 @@ class TaskAnswers final : public StudyAnswers {
   std::string practice() const {
     std::vector<std::string> names;
     for (const TaskBlock& block : protocol_.blocks) {
-      if (block.practice) names.push_back(block.name);
+      if (block.practice) add_once(block.name, names);
     }
     return names.empty() ? "" : "Practice: " + blocks_in_words(names) + "; not analysed.";
   }

@@ -8,8 +8,9 @@
 namespace palpate::analysis {
 namespace {
 
-const std::vector<std::string> kNames{"cone", "cube", "sphere", "my-shape", "none", "a.b.c_1"};
-const std::vector<double> kValues{10, 4, -2, 7, std::nan(""), 6};
+const std::vector<std::string> kNames{"cone", "cube",    "sphere", "my-shape",
+                                      "none", "a.b.c_1", "a.b:c.p"};
+const std::vector<double> kValues{10, 4, -2, 7, std::nan(""), 6, 0.02};
 
 std::optional<std::size_t> resolve(const std::string& name) {
   const auto found = std::find(kNames.begin(), kNames.end(), name);
@@ -49,6 +50,7 @@ TEST(Pattern, HoldsOrNot) {
                           "((((cone))))>\t5",
                           "cone!=cube",
                           "a.b.c_1 == 6",
+                          "a.b:c.p<.05",
                           "'a.b.c_1'*.5 == 3",
                           "min(cone, max(cube, sphere), 99) == 4"}) {
     EXPECT_EQ(holds(yes), true) << yes;
