@@ -96,6 +96,7 @@ StoredProtocol read_stored_protocol(const std::string& text) {
   if (!json.is_object()) return out;
   read_text(json, "name", out.name);
   read_text(json, "title", out.title);
+  read_text(json, "description", out.description);
   if (const auto seed = json.find("seed"); seed != json.end() && seed->is_number_integer())
     out.seed = seed->dump();
   if (const auto n = json.find("repetitions"); n != json.end() && n->is_number())

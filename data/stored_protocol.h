@@ -32,14 +32,14 @@ struct StoredFactor {
 };
 
 struct StoredProtocol {
-  std::string name, title;            ///< "": none
-  std::string seed;                   ///< of the trial orders, as written; "": none
-  std::vector<std::string> stimuli;   ///< names, in the protocol's order
-  int repetitions = 0;                ///< of a protocol without blocks
-  std::vector<StoredBlock> blocks;    ///< empty: version 1
-  std::vector<StoredColumn> columns;  ///< of participants
-  GroupAssignment groups;             ///< of participants
-  std::vector<StoredFactor> factors;  ///< empty: none
+  std::string name, title, description;  ///< "": none
+  std::string seed;                      ///< of the trial orders, as written; "": none
+  std::vector<std::string> stimuli;      ///< names, in the protocol's order
+  int repetitions = 0;                   ///< of a protocol without blocks
+  std::vector<StoredBlock> blocks;       ///< empty: version 1
+  std::vector<StoredColumn> columns;     ///< of participants
+  GroupAssignment groups;                ///< of participants
+  std::vector<StoredFactor> factors;     ///< empty: none
 };
 
 StoredProtocol read_stored_protocol(const std::string& text);

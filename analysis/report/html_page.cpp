@@ -233,6 +233,18 @@ std::string HtmlPage::html(std::string_view footer) const {
   return out + "</script>\n</body>\n</html>\n";
 }
 
+void put_registration_section(HtmlPage& page, const std::string& checked,
+                              const std::string& check_page) {
+  if (checked.empty()) return;
+  page.begin_section("registration",
+                     check_page.empty() ? "Registration" : "Check against the registration",
+                     "Registration");
+  page.body() += "<p>" + escaped_sentence(printable(checked, 4000)) + "</p>\n";
+  if (!check_page.empty())
+    page.body() += "<p><a href=\"" + escaped(check_page) + "\">The check, point by point</a></p>\n";
+  page.end_section();
+}
+
 void put_list(std::string& out, const std::vector<std::string>& sentences) {
   if (sentences.empty()) return;
   out += "<ul>\n";

@@ -71,6 +71,10 @@ class HtmlPage {
   std::string title_, label_, banner_, above_title_, below_title_, links_, body_;
 };
 
+/// The section on the registration, if there is something to say. \param check_page  "": no link
+void put_registration_section(HtmlPage& page, const std::string& checked,
+                              const std::string& check_page);
+
 /// Appends an unordered list; nothing for no sentences.
 void put_list(std::string& out, const std::vector<std::string>& sentences);
 /// The same under the heading "To quote".

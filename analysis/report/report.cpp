@@ -500,13 +500,7 @@ class Report {
       put_table(page_.body(), table);
     }
     page_.end_section();
-    if (!record_.checked.empty()) {
-      begin({"registration", "Check against the registration", "Registration"});
-      page_.body() += "<p>" + escaped_sentence(printable(record_.checked, 4000)) +
-                      "</p>\n<p><a href=\"" + escaped(record_.check_page) +
-                      "\">The check, point by point</a></p>\n";
-      page_.end_section();
-    }
+    put_registration_section(page_, record_.checked, record_.check_page);
     begin({"source", "Protocol, seeds, versions and checksums", "Source"});
     put_source();
     page_.end_section();

@@ -98,7 +98,7 @@ class TaskPage {
     put_cells();
     put_figures(false);
     put_identification();
-    put_check();
+    put_registration_section(page_, record_.checked, record_.check_page);
     return page_.html("Analysed with palpate " + program_version + ".");
   }
 
@@ -117,15 +117,6 @@ class TaskPage {
     page_.below_title() += "<div class=\"warnings\" aria-label=\"Warnings\">\n";
     put_list(page_.below_title(), source.warnings);
     page_.below_title() += "</div>\n";
-  }
-
-  void put_check() {
-    if (record_.checked.empty()) return;
-    page_.begin_section("registration", "Check against the registration", "Registration");
-    page_.body() += "<p>" + escaped_sentence(printable(record_.checked, 4000)) +
-                    "</p>\n<p><a href=\"" + escaped(record_.check_page) +
-                    "\">The check, point by point</a></p>\n";
-    page_.end_section();
   }
 
   void put_people() {

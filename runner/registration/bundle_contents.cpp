@@ -251,37 +251,47 @@ void judge_all(analysis::StudyTable table, const Registration& registered, Study
 /// What a table of tasks needs beside itself, for the analysis as in a database.
 struct Design {
   std::vector<analysis::ProtocolText> protocols;  ///< empty: a study of shapes needs none
-  /// Whose trials are analysed: the registered protocol's, unless the study has none of its name.
+  /// Whose trials are analysed; "": all.
   std::string protocol;
 };
 
-Design design_of(const Registration& registered, const analysis::StudyRecord& record) {
-  if (protocols::study_of_shapes(registered.protocol)) return {};
-  const std::string& name = registered.protocol.name;
+/// \param registered  its trials are analysed, unless the study has none of its name; none: all
+Design design_of(const Registration* registered, const analysis::StudyRecord& record) {
+  if (registered == nullptr) {
+    const bool of_shapes =
+        std::ranges::all_of(record.protocols, [](const analysis::ProtocolText& one) {
+          return data::read_stored_protocol(one.text).blocks.empty();
+        });
+    return {of_shapes ? std::vector<analysis::ProtocolText>() : record.protocols, ""};
+  }
+  if (protocols::study_of_shapes(registered->protocol)) return {};
+  const std::string& name = registered->protocol.name;
   const bool there = std::ranges::find(record.protocols, name, &analysis::ProtocolText::name) !=
                      record.protocols.end();
   return {record.protocols, there ? name : ""};
 }
 
-/// The analysis of the trials in a bundle as reproduce.sh makes it.
-analysis::StudyAnalysis analyze_bundle(const std::string& folder, const Registration& registered,
-                                       const analysis::StudyRecord& record) {
-  const Design design = design_of(registered, record);
+/// The analysis of the trials in a bundle as reproduce.sh makes it, and its label.
+void analyze_bundle(const std::string& folder, BundleFacts& facts) {
+  const Registration* const registered = facts.checked ? &facts.checked->registered : nullptr;
+  const Design design = design_of(registered, facts.record);
   const std::string trials = (fs::path(folder) / kTrials).string();
   std::vector<std::string> wanted;
   if (!design.protocol.empty()) wanted.push_back(design.protocol);
   analysis::StudyTable table = analysis::read_study_csv(trials, wanted, design.protocols);
   table.source = table.provenance.source = kTrials;
   if (table.times) table.times->provenance.source = kTrials;
-  return study::analyze_study(std::move(table), registered.too_fast);
+  facts.label = analysis::label_of(table);
+  facts.analysis = study::analyze_study(std::move(table), facts.too_fast);
 }
 
 /// A number that the shell and the options read back exactly.
 std::string as_option(double value) { return nlohmann::json(value).dump(); }
 
-std::string reproduce_script(const Registration& registered, const analysis::StudyRecord& record) {
-  const Design design = design_of(registered, record);
-  std::string options = as_option(registered.too_fast);
+std::string reproduce_script(const BundleFacts& facts) {
+  const Design design =
+      design_of(facts.checked ? &facts.checked->registered : nullptr, facts.record);
+  std::string options = as_option(facts.too_fast);
   if (!design.protocols.empty()) options += " --design data/record.json";
   if (!design.protocol.empty()) options += " --protocol " + design.protocol;
   return R"sh(#!/bin/sh
@@ -301,63 +311,66 @@ echo "analysis.json is reproduced"
 )sh";
 }
 
-std::string title_of(const protocols::Protocol& protocol) {
-  return protocol.title.empty() ? protocol.name : protocol.title;
+/// How the study stands to a registration, and its verdicts.
+std::string registration_in_words(const BundleFacts& facts) {
+  if (!facts.checked)
+    return "**" + conclusion_of(facts) +
+           ": its analyses are exploratory. No hypothesis and no plan was fixed before the "
+           "data.**\n\n";
+  const Registration& registered = facts.checked->registered;
+  std::string out = "Held against the registration of " +
+                    data::format_utc(registered.made_utc_ns).substr(0, 10) + ": " +
+                    conclusion_of(facts) + ". Digest of the registration: `" + registered.digest +
+                    "`.\n\n";
+  for (const auto& [one, judgement] : facts.checked->check.hypotheses)
+    out += "* " + one.id + ", " + analysis::to_string(judgement.verdict) + ": " +
+           as_markdown(one.text) + "\n";
+  return out;
 }
 
 std::string readme(const BundleFacts& facts) {
-  const Registration& registered = facts.registered;
-  const StudyCheck& check = facts.check;
   const data::StudyAbout& about = facts.about;
-  const std::string& format = facts.format;
-  const protocols::Protocol& protocol = registered.protocol;
   std::string authors;
   for (const data::StudyAuthor& author : about.authors)
     authors += (authors.empty() ? "" : ", ") + author.name;
-  std::string out = "# " + as_markdown(title_of(protocol)) + "\n\n";
-  if (!check.label.empty())
-    out += "**" + check.label + ": a rehearsal. Data of " +
-           (check.label.starts_with("PARTLY") ? "some of them" : "all of them") +
+  std::string out = "# " + as_markdown(facts.title) + "\n\n";
+  if (!facts.label.empty())
+    out += "**" + facts.label + ": a rehearsal. Data of " +
+           (facts.label.starts_with("PARTLY") ? "some of them" : "all of them") +
            " come from a model of a participant, not from people.**\n\n";
   if (!authors.empty()) out += as_paragraph(authors) + "\n\n";
-  if (!protocol.description.empty()) out += as_paragraph(protocol.description) + "\n\n";
+  if (!facts.description.empty()) out += as_paragraph(facts.description) + "\n\n";
   out += "License: " + as_markdown(about.license) + ". " +
-         analysis::counted(check.participants, "participant", "participants") +
-         "; held against the registration of " +
-         data::format_utc(registered.made_utc_ns).substr(0, 10) + ": " + conclusion_of(check) +
-         ". Digest of the registration: `" + registered.digest + "`.\n\n";
-  for (const auto& [one, judgement] : check.hypotheses)
-    out += "* " + one.id + ", " + analysis::to_string(judgement.verdict) + ": " +
-           as_markdown(one.text) + "\n";
+         analysis::counted(facts.participants, "participant", "participants") + ".\n\n" +
+         registration_in_words(facts);
+  const bool alone = design_of(facts.checked ? &facts.checked->registered : nullptr, facts.record)
+                         .protocols.empty();
   out +=
       "\n| file | what it is |\n|---|---|\n"
-      "| `data/trials.csv` | one row a trial; times are relative, without "
-      "dates |\n"
+      "| `data/trials.csv` | one row a trial; times are relative, without dates |\n"
       "| `data/codebook.csv` | what every column and code means |\n"
       "| `data/record.json` | what the trials leave out: devices, builds, seeds, protocols |\n"
       "| `data/" +
-      format + "/` | the same data as a " + (format == "bids" ? "BIDS" : "Psych-DS") +
-      " dataset, with servo-rate samples if they were kept |\n"
-      "| `registration/` | what was registered before the first session |\n"
-      "| `check.html`, `check.json` | the study held against its "
-      "registration |\n"
+      facts.format + "/` | the same data as a " + (facts.format == "bids" ? "BIDS" : "Psych-DS") +
+      " dataset, with servo-rate samples if they were kept |\n";
+  if (facts.checked)
+    out +=
+        "| `registration/` | what was registered before the first session |\n"
+        "| `check.html`, `check.json` | the study held against its registration |\n";
+  out +=
       "| `report.html`, `figures/` | the analysis for reading |\n"
-      "| `analysis.json` | every number of the analysis, made from "
-      "`data/trials.csv` " +
-      std::string(protocols::study_of_shapes(protocol) ? "alone"
-                                                       : "and the protocol in `data/record.json`") +
+      "| `analysis.json` | every number of the analysis, made from `data/trials.csv` " +
+      std::string(alone ? "alone" : "and the protocol in `data/record.json`") +
       " |\n"
       "| `about.json` | authors, license, funding |\n"
-      "| `ro-crate-metadata.json` | this folder described for programs, "
-      "RO-Crate 1.2 |\n"
-      "| `reproduce.sh` | makes `analysis.json` again and compares the "
-      "bytes |\n"
+      "| `ro-crate-metadata.json` | this folder described for programs, RO-Crate 1.2 |\n"
+      "| `reproduce.sh` | makes `analysis.json` again and compares the bytes |\n"
       "| `SHA256SUMS` | checksums of all files |\n\n"
-      "`sh reproduce.sh`, or `palpate bundle --verify .`, with "
-      "palpate " PALPATE_VERSION
-      ", shows that the numbers follow from the data; the second also "
-      "that verdicts, check, report, figures and dataset do. Compare the digest with the one that "
-      "the registry holds (`--digest`).\n";
+      "`sh reproduce.sh`, or `palpate bundle --verify .`, with palpate " PALPATE_VERSION
+      ", shows that the numbers follow from the data; the second also that " +
+      std::string(facts.checked ? "verdicts, check, report, figures and dataset do. Compare the "
+                                  "digest with the one that the registry holds (`--digest`).\n"
+                                : "report, figures and dataset do.\n");
   return out;
 }
 
@@ -388,8 +401,13 @@ std::string description_of(const std::string& name) {
 }
 
 /// With the conclusion of the check, for the report.
-analysis::StudyRecord with_check(analysis::StudyRecord record, const Registration& registered,
-                                 const StudyCheck& check) {
+analysis::StudyRecord with_check(const BundleFacts& facts) {
+  analysis::StudyRecord record = facts.record;
+  if (!facts.checked) {
+    record.checked = conclusion_of(facts) + ": exploratory.";
+    return record;
+  }
+  const auto& [registered, check] = *facts.checked;
   record.checked =
       conclusion_of(check) + " of " + data::format_utc(registered.made_utc_ns).substr(0, 10) + ".";
   for (const auto& [one, judgement] : check.hypotheses)
@@ -397,6 +415,31 @@ analysis::StudyRecord with_check(analysis::StudyRecord record, const Registratio
   record.checked += " Digest of the registration: " + registered.digest + ".";
   record.check_page = "check.html";
   return record;
+}
+
+/// Holds the trials against the registration. \param points  of the check so far
+void check_again(const std::string& folder, const std::string& registration,
+                 const StatedStudy& stated, const std::vector<CheckPoint>& points, StudyData study,
+                 BundleFacts& facts) {
+  auto& [registered, check] = *facts.checked;
+  const bool own_only = !keep_study_named(registered.protocol.name, study).empty();
+  put_without_trials(stated, study);
+  check.participants = facts.participants = study.participants.size();
+  check.points = points;
+  const auto digest = std::ranges::find(points, "digest", &CheckPoint::id);
+  const bool compared = digest != points.end() && digest->finding == Finding::as_registered;
+  for (const CheckPoint& again :
+       points_of_trials(registered, registration, study,
+                        {.digest = compared ? registered.digest : std::string()})) {
+    const auto at = std::ranges::find(check.points, again.id, &CheckPoint::id);
+    if (at == check.points.end()) {
+      check.points.push_back(again);
+    } else if (again.id != "digest" || at->finding != Finding::deviation) {
+      *at = again;
+    }
+  }
+  judge_all(own_table(folder, study, own_only, registered, facts.record), registered, check);
+  facts.label = check.label;
 }
 
 }  // namespace
@@ -428,7 +471,8 @@ TextTable read_text_table(const std::string& path) {
   return out;
 }
 
-std::string record_json(const analysis::StudyRecord& record, const StudyCheck& check) {
+std::string record_json(const analysis::StudyRecord& record, std::size_t removed,
+                        const std::vector<data::Participant>& without_trials) {
   Json out = {{"version", 1}, {"protocols", Json::array()}};
   for (const analysis::ProtocolText& one : record.protocols)
     out["protocols"].push_back({{"name", one.name}, {"sha256", one.sha256}, {"text", one.text}});
@@ -437,9 +481,9 @@ std::string record_json(const analysis::StudyRecord& record, const StudyCheck& c
   out["builds"] = record.builds;
   out["seeds"] = record.seeds;
   out["attempts_cut_off"] = record.n_cut_off;
-  out["removed"] = check.removed;
+  out["removed"] = removed;
   out["without_trials"] = Json::array();
-  for (const data::Participant& one : check.without_trials)
+  for (const data::Participant& one : without_trials)
     out["without_trials"].push_back({{"participant", one.code}, {"number", one.enrolled_number}});
   return out.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
 }
@@ -475,10 +519,30 @@ std::vector<CheckPoint> parse_points(const std::string& text, const std::string&
   return out;
 }
 
+void require_one_study(const std::vector<analysis::ProtocolText>& protocols,
+                       const std::string& source) {
+  std::set<std::string> names;
+  for (const analysis::ProtocolText& one : protocols) names.insert(one.name);
+  if (names.size() == 1) return;
+  if (names.empty()) throw UsageError(printable(source) + ": expected trials of a protocol");
+  throw UsageError(
+      printable(source) + ": expected the trials of one protocol, found " +
+      printable(analysis::joined(std::vector<std::string>(names.begin(), names.end()))) +
+      ": with --registration the registered one is analysed");
+}
+
 BundleFacts bundle_facts(const std::string& folder, const std::vector<CheckPoint>& points) {
   const std::string registration = (fs::path(folder) / "registration").string();
   BundleFacts out;
-  out.registered = read_registration(registration);
+  if (fs::exists(registration)) {
+    Registration& registered = out.checked.emplace().registered;
+    registered = read_registration(registration);
+    out.name = registered.protocol.name;
+    out.title = registered.protocol.title;
+    out.description = registered.protocol.description;
+  }
+  out.too_fast =
+      out.checked ? out.checked->registered.too_fast : analysis::AnalysisSettings{}.too_fast;
   out.about = read_about_text(read_member(folder, "about.json"),
                               (fs::path(folder) / "about.json").string());
   out.format = fs::is_directory(fs::path(folder) / "data/bids") ? "bids" : "psych-ds";
@@ -489,39 +553,37 @@ BundleFacts bundle_facts(const std::string& folder, const std::vector<CheckPoint
   out.record = stated.record;
   const TrialFields fields(out.trials, trials);
   put_servo(out.trials, fields, out.record);
-  out.analysis = analyze_bundle(folder, out.registered, out.record);
-
+  analyze_bundle(folder, out);
   StudyData study = study_of(out.trials, fields, stated);
-  const bool own_only = !keep_study_named(out.registered.protocol.name, study).empty();
-  put_without_trials(stated, study);
-  out.check.participants = study.participants.size();
-  out.check.points = points;
-  const auto digest = std::ranges::find(points, "digest", &CheckPoint::id);
-  const bool compared = digest != points.end() && digest->finding == Finding::as_registered;
-  for (const CheckPoint& again :
-       points_of_trials(out.registered, registration, study,
-                        {.digest = compared ? out.registered.digest : std::string()})) {
-    const auto at = std::ranges::find(out.check.points, again.id, &CheckPoint::id);
-    if (at == out.check.points.end()) {
-      out.check.points.push_back(again);
-    } else if (again.id != "digest" || at->finding != Finding::deviation) {
-      *at = again;
-    }
+  if (out.checked) {
+    check_again(folder, registration, stated, points, std::move(study), out);
+  } else {
+    require_one_study(out.record.protocols, (fs::path(folder) / kRecord).string());
+    out.participants = study.participants.size();
+    const analysis::ProtocolText& last = out.record.protocols.back();
+    out.name = last.name;
+    out.title = last.title;
+    out.description = data::read_stored_protocol(last.text).description;
   }
-  judge_all(own_table(folder, study, own_only, out.registered, out.record), out.registered,
-            out.check);
+  if (out.title.empty()) out.title = out.name;
   return out;
 }
 
+std::string conclusion_of(const BundleFacts& facts) {
+  return facts.checked ? conclusion_of(facts.checked->check) : "The study was not registered";
+}
+
 std::map<std::string, std::string> derived_files(const BundleFacts& facts) {
-  const analysis::StudyRecord record = with_check(facts.record, facts.registered, facts.check);
+  const analysis::StudyRecord record = with_check(facts);
   std::map<std::string, std::string> out = {
       {"analysis.json", analysis::study_json(facts.analysis)},
-      {"check.json", check_json(facts.check, facts.registered)},
-      {"check.html", check_html(facts.check, facts.registered)},
       {"report.html", analysis::study_html(facts.analysis, record)},
       {"README.md", readme(facts)},
-      {"reproduce.sh", reproduce_script(facts.registered, facts.record)}};
+      {"reproduce.sh", reproduce_script(facts)}};
+  if (facts.checked) {
+    out["check.json"] = check_json(facts.checked->check, facts.checked->registered);
+    out["check.html"] = check_html(facts.checked->check, facts.checked->registered);
+  }
   for (const analysis::Figure& figure : analysis::study_figures(facts.analysis, record))
     out["figures/" + figure.id + ".svg"] = analysis::figure_svg(figure, analysis::light_palette());
   return out;
@@ -529,15 +591,15 @@ std::map<std::string, std::string> derived_files(const BundleFacts& facts) {
 
 std::string crate_text(const std::string& folder, const BundleFacts& facts,
                        const std::string& date) {
-  const protocols::Protocol& protocol = facts.registered.protocol;
-  const StudyCheck& check = facts.check;
+  const std::string of_label = facts.label.empty() ? "" : " " + facts.label + ".";
   CrateFacts crate;
-  crate.name = title_of(protocol) + (check.label.empty() ? "" : " (" + check.label + ")");
-  crate.description = (protocol.description.empty() ? "" : protocol.description + " ") +
-                      "Data, registration, check, analysis and report of a study of touch "
-                      "with " +
-                      analysis::counted(check.participants, "participant", "participants") + "." +
-                      (check.label.empty() ? "" : " " + check.label + ".");
+  crate.name = facts.title + (facts.label.empty() ? "" : " (" + facts.label + ")");
+  crate.description =
+      (facts.description.empty() ? "" : facts.description + " ") +
+      (facts.checked ? "Data, registration, check, analysis and report of a study of touch with "
+                     : "Data, exploratory analysis and report of a study of touch that was not "
+                       "registered, with ") +
+      analysis::counted(facts.participants, "participant", "participants") + "." + of_label;
   crate.date = date;
   crate.program_version = PALPATE_VERSION;
   crate.about = facts.about;
@@ -548,11 +610,12 @@ std::string crate_text(const std::string& folder, const BundleFacts& facts,
   }
   crate.files.push_back({kChecksums, 0, "", "Checksums of all files."});
   crate.actions = {
-      {"#analysis", "Analysis of the trials", {kTrials}, {"analysis.json", "report.html"}},
-      {"#check",
-       "Check against the registration",
-       {kTrials, "registration/registration.json"},
-       {"check.json", "check.html"}}};
+      {"#analysis", "Analysis of the trials", {kTrials}, {"analysis.json", "report.html"}}};
+  if (facts.checked)
+    crate.actions.push_back({"#check",
+                             "Check against the registration",
+                             {kTrials, "registration/registration.json"},
+                             {"check.json", "check.html"}});
   return ro_crate_json(crate);
 }
 

@@ -1,9 +1,11 @@
 #pragma once
-// What a bundle holds: its base (trials, what they leave out, registration, about.json) and the
-// files that follow from it. 'palpate bundle' writes them, '--verify' makes them again.
+// What a bundle holds: its base (trials, what they leave out, about.json, and a registration if
+// there was one) and the files that follow from it. 'palpate bundle' writes them, '--verify' makes
+// them again.
 
 #include <cstddef>
 #include <map>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -33,7 +35,9 @@ TextTable read_text_table(const std::string& path);
 
 /// data/record.json: what the table of trials leaves out. Its servo quality is not written: it
 /// follows from the trials.
-std::string record_json(const analysis::StudyRecord& record, const StudyCheck& check);
+/// \param removed  codes, with 'palpate forget' \param without_trials  who began and completed none
+std::string record_json(const analysis::StudyRecord& record, std::size_t removed,
+                        const std::vector<data::Participant>& without_trials);
 
 /// \throws protocols::InputError with every fault
 analysis::StudyRecord parse_record(const std::string& text, const std::string& file);
@@ -41,28 +45,48 @@ analysis::StudyRecord parse_record(const std::string& text, const std::string& f
 /// The points of a check.json. \throws protocols::InputError with every fault
 std::vector<CheckPoint> parse_points(const std::string& text, const std::string& file);
 
+/// A study held against its registration.
+struct CheckedStudy {
+  Registration registered;
+  StudyCheck check;
+};
+
 /// What the derived files are made of.
 struct BundleFacts {
-  Registration registered;
   data::StudyAbout about;
-  std::string format;  ///< "psych-ds", "bids"
+  std::string format;                    ///< "psych-ds", "bids"
+  std::string name, title, description;  ///< of the protocol
+  std::string label;                     ///< "SIMULATED PARTICIPANTS"; empty: people
+  std::size_t participants = 0;
+  double too_fast = 0;  ///< s
   TextTable trials;
   analysis::StudyAnalysis analysis;
   analysis::StudyRecord record;
-  StudyCheck check;
+  std::optional<CheckedStudy> checked;  ///< none: the study was not registered
 };
+
+/// Requires protocols of one name, by which an analysis without a registration knows its trials.
+/// \throws UsageError
+void require_one_study(const std::vector<analysis::ProtocolText>& protocols,
+                       const std::string& source);
 
 /// Reads the base of a bundle, analyses its trials and judges the hypotheses. \param points  of the
 /// check; those that follow from the trials are made again \throws UsageError, InputError
 BundleFacts bundle_facts(const std::string& folder, const std::vector<CheckPoint>& points);
 
-/// analysis.json, check.json, check.html, report.html, figures/, README.md and reproduce.sh by
-/// name.
+/// "Run as registered", ..., or that the study was not registered.
+std::string conclusion_of(const BundleFacts& facts);
+
+/// analysis.json, report.html, figures/, README.md and reproduce.sh by name; of a registered study
+/// check.json and check.html.
 std::map<std::string, std::string> derived_files(const BundleFacts& facts);
 
 /// ro-crate-metadata.json, of all other files. \param date  "2026-11-25"
 std::string crate_text(const std::string& folder, const BundleFacts& facts,
                        const std::string& date);
+
+/// Prints the digest, the conclusion and the verdicts.
+void print_conclusion(const BundleFacts& facts);
 
 /// Makes everything again that follows from the base, compares the bytes, and the tables of the
 /// dataset with the trials. Prints a line for each. \param digest  of the registration, as the

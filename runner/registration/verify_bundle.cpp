@@ -96,6 +96,8 @@ void compare_derived(const std::string& folder, const BundleFacts& facts, Compar
   for (const std::string& name : there) {
     if (name.starts_with("figures/") && !made.contains(name))
       out.differs(name + " is none of the analysis");
+    if (name.starts_with("check.") && !facts.checked)
+      out.differs(name + " is there without a registration");
   }
   if (same_figures > 0) out.same("figures/, " + std::to_string(same_figures) + " made again");
 }
@@ -328,7 +330,26 @@ void compare_copies(const std::string& folder, const BundleFacts& facts, Compari
   out.result(base + ", its authors and license, by about.json", faults);
 }
 
+void compare_digest(const BundleFacts& facts, const std::string& digest, Comparison& out) {
+  std::vector<std::string> faults;
+  if (!facts.checked) {
+    faults.emplace_back("registration/: there is none, and so no digest");
+  } else if (digest != facts.checked->registered.digest) {
+    faults.emplace_back("registration/: its digest is not the given one");
+  }
+  out.result("registration/, by the given digest", faults);
+}
+
 }  // namespace
+
+void print_conclusion(const BundleFacts& facts) {
+  if (facts.checked)
+    std::cout << "Digest of the registration " << facts.checked->registered.digest << "\n";
+  std::cout << conclusion_of(facts) << "\n";
+  if (!facts.checked) return;
+  for (const auto& [one, judgement] : facts.checked->check.hypotheses)
+    std::cout << one.id << ": " << analysis::to_string(judgement.verdict) << "\n";
+}
 
 int verify_bundle(const std::string& folder, const std::string& digest) {
   Comparison out;
@@ -336,7 +357,10 @@ int verify_bundle(const std::string& folder, const std::string& digest) {
   const auto facts_read = [&]() -> std::optional<BundleFacts> {
     try {
       const std::string check = (fs::path(folder) / "check.json").string();
-      return bundle_facts(folder, parse_points(read_member(folder, "check.json"), check));
+      const bool registered = fs::exists(fs::path(folder) / "registration");
+      return bundle_facts(folder, registered
+                                      ? parse_points(read_member(folder, "check.json"), check)
+                                      : std::vector<CheckPoint>());
     } catch (const std::runtime_error& error) {  // UsageError and InputError, too
       out.differs(error.what());
       return std::nullopt;
@@ -347,16 +371,9 @@ int verify_bundle(const std::string& folder, const std::string& digest) {
   compare_derived(folder, facts, out);
   compare_tables(folder, facts, out);
   compare_copies(folder, facts, out);
-  if (!digest.empty())
-    out.result("registration/, by the given digest",
-               digest == facts.registered.digest
-                   ? std::vector<std::string>()
-                   : std::vector<std::string>{"registration/: its digest is not the given one"});
+  if (!digest.empty()) compare_digest(facts, digest, out);
   if (!out.all_same()) note_other_version(folder);
-  std::cout << "Digest of the registration " << facts.registered.digest << "\n"
-            << conclusion_of(facts.check) << "\n";
-  for (const auto& [one, judgement] : facts.check.hypotheses)
-    std::cout << one.id << ": " << analysis::to_string(judgement.verdict) << "\n";
+  print_conclusion(facts);
   return out.all_same() ? 0 : 1;
 }
 

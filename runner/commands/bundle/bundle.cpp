@@ -80,20 +80,31 @@ int make_bundle(const BundleOptions& options) {
                      ": expected a license, without which "
                      "nobody may use the bundle, such as "
                      "\"license\": \"CC-BY-4.0\"");
-  const registration::Registration registered =
-      registration::read_registration(options.registration);
   registration::require_replaceable_folder(options.out, options.force, registration::kCrate);
-  const registration::StudyCheck check = registration::check_study(
-      registered, options.registration, options.database, {.digest = options.digest});
+  std::optional<registration::StudyCheck> check;
+  if (!options.registration.empty())
+    check = registration::check_study(registration::read_registration(options.registration),
+                                      options.registration, options.database,
+                                      {.digest = options.digest});
   data::Store store = data::Store::open(options.database, data::Store::Mode::read_for_export);
+  const analysis::StudyRecord record = analysis::read_study_record(store);
+  std::vector<data::Participant> without_trials;
+  auto removed = static_cast<std::size_t>(store.counts().withdrawn);
+  if (check) {
+    without_trials = check->without_trials;
+    removed = check->removed;
+  } else {
+    registration::require_one_study(record.protocols, options.database);
+  }
   warn_of_exposure(options.database);
   data::AtomicFolder draft(options.out);
   put_data(options, store, about, draft);
-  put_registration(options.registration, draft);
+  if (check) put_registration(options.registration, draft);
   registration::write_member(draft, "about.json", about_text);
   registration::write_member(draft, registration::kRecord,
-                             registration::record_json(analysis::read_study_record(store), check));
-  const registration::BundleFacts facts = registration::bundle_facts(draft / "", check.points);
+                             registration::record_json(record, removed, without_trials));
+  const registration::BundleFacts facts = registration::bundle_facts(
+      draft / "", check ? check->points : std::vector<registration::CheckPoint>());
   for (const auto& [name, text] : registration::derived_files(facts))
     registration::write_member(draft, name, text);
   ::chmod((draft / "reproduce.sh").c_str(), 0700);
@@ -101,13 +112,10 @@ int make_bundle(const BundleOptions& options) {
                              registration::crate_text(draft / "", facts, today()));
   registration::write_checksums(draft);
   draft.commit(options.force);
-  std::cout << printable(options.out) << ": " << registered.protocol.name << ", "
-            << analysis::counted(facts.check.participants, "participant", "participants")
-            << (facts.check.label.empty() ? "" : ", " + facts.check.label) << "\n"
-            << registration::conclusion_of(facts.check) << "\nDigest of the registration "
-            << registered.digest << "\n";
-  for (const auto& [one, judgement] : facts.check.hypotheses)
-    std::cout << one.id << ": " << analysis::to_string(judgement.verdict) << "\n";
+  std::cout << printable(options.out) << ": " << facts.name << ", "
+            << analysis::counted(facts.participants, "participant", "participants")
+            << (facts.label.empty() ? "" : ", " + facts.label) << "\n";
+  registration::print_conclusion(facts);
   return 0;
 }
 
@@ -116,23 +124,18 @@ int make_bundle(const BundleOptions& options) {
 int bundle_command(const std::vector<std::string>& args) {
   CommandLine line;
   line.usage =
-      "palpate bundle --db FILE --registration FOLDER --about "
-      "FILE.json --out FOLDER\n"
+      "palpate bundle --db FILE [--registration FOLDER] --about FILE.json --out FOLDER\n"
       "       [--format psych-ds|bids] [--digest SHA256] [--force]\n"
       "       palpate bundle --verify FOLDER [--digest SHA256]";
   line.summary =
-      "Makes a folder to deposit: the data (as CSV, and as a "
-      "Psych-DS or BIDS dataset; times are\n"
-      "relative, without dates), the registration, the check "
-      "against it, the analysis with report\n"
-      "and figures, a description as RO-Crate, a script that "
-      "reproduces the analysis, and\n"
-      "checksums. Nothing is sent anywhere. --verify makes "
-      "everything that follows from data and\n"
-      "registration again (analysis, verdicts, check, report, "
-      "figures, descriptions), compares the\n"
-      "bytes, and the tables of the dataset with the trials: exit "
-      "status 1 if anything differs.";
+      "Makes a folder to deposit: the data (as CSV, and as a Psych-DS or BIDS dataset; times are\n"
+      "relative, without dates), the registration and the check against it, the analysis with\n"
+      "report and figures, a description as RO-Crate, a script that reproduces the analysis, and\n"
+      "checksums. Without --registration the folder says that the study was not registered.\n"
+      "Nothing is sent anywhere. --verify makes everything that follows from data and\n"
+      "registration again (analysis, verdicts, check, report, figures, descriptions), compares\n"
+      "the bytes, and the tables of the dataset with the trials: exit status 1 if anything\n"
+      "differs.";
   line.example =
       "  palpate bundle --db study.db --registration registration "
       "--about study.json --out study-1.0\n"
@@ -141,7 +144,7 @@ int bundle_command(const std::vector<std::string>& args) {
   auto add = line.options.add_options();
   add("db", po::value(&options.database)->value_name("FILE"), "the study's database");
   add("registration", po::value(&options.registration)->value_name("FOLDER"),
-      "what 'palpate register' made");
+      "what 'palpate register' made; none: an exploratory study, labelled so");
   add("about", po::value(&options.about)->value_name("FILE"),
       "authors, license, funding, as for 'palpate export'; a license is "
       "required");
@@ -155,13 +158,18 @@ int bundle_command(const std::vector<std::string>& args) {
   const auto values = line.parse(args);
   if (!values) return 0;
   const bool verify = values->count("verify") > 0;
-  for (const char* option : {"db", "registration", "about", "out"}) {
+  if (verify && values->count("registration"))
+    throw UsageError("--verify: without --registration\nUsage: " + line.usage +
+                     "\nMore: add --help");
+  for (const char* option : {"db", "about", "out"}) {
     const bool given = values->count(option) > 0;
     if (given == verify)
       throw UsageError(std::string(verify ? "--verify: without --" : "expected --") + option +
                        "\nUsage: " + line.usage + "\nMore: add --help");
   }
   if (values->count("digest")) registration::read_digest(options.digest);
+  if (!verify && values->count("digest") && options.registration.empty())
+    throw UsageError("--digest: expected --registration, whose digest it is");
   if (verify) return registration::verify_bundle(options.verify, options.digest);
   if (options.format != "psych-ds" && options.format != "bids")
     throw UsageError("--format: expected psych-ds or bids, found '" +

@@ -389,6 +389,33 @@ class Bundle(unittest.TestCase):
             self.assertNotRegex((self.dir / "new" / name).read_text(), r"<script>alert|<b>faster")
         self.assertEqual(crate_faults(self.dir / "new"), [])
 
+    def test_an_unregistered_study_says_so(self):
+        for form in ("psych-ds", "bids"):
+            out = self.dir / form
+            made = run("bundle", "--db", "study.db", "--about", "study.json", "--out", out, "--format", form,
+                       folder=self.dir)
+            self.assertIn("not registered", made.stdout)
+            there = files(out)
+            self.assertFalse({name for name in there if name.startswith(("registration/", "check."))})
+            for name in ("README.md", "report.html", "ro-crate-metadata.json"):
+                self.assertIn("not registered", (out / name).read_text(), name)
+                self.assertIn("SIMULATED PARTICIPANTS", (out / name).read_text(), name)
+            self.assertNotIn("check.html", (out / "report.html").read_text())
+            self.assertEqual(crate_faults(out), [])
+            self.assertIn("not registered", run("bundle", "--verify", out).stdout)
+            script = subprocess.run(["sh", "reproduce.sh"], cwd=out, capture_output=True, text=True,
+                                    env={**os.environ, "PALPATE": PALPATE})
+            self.assertEqual(script.returncode, 0, script.stderr)
+        run("analyze", "--db", "study.db", "--json", "a.json", folder=self.dir)
+        mine, theirs = (json.loads(p.read_text()) for p in (self.dir / "a.json", self.dir / "bids/analysis.json"))
+        self.assertEqual(mine["paired_by_shape"], theirs["paired_by_shape"])
+
+    def test_a_registration_taken_away_is_named(self):
+        shutil.rmtree(self.bundle / "registration")
+        done = run("bundle", "--verify", self.bundle, status=1)
+        self.assertIn("check.html is there without a registration", done.stdout)
+        self.assertIn("DIFFERS  README.md", done.stdout)
+
     def test_what_is_refused(self):
         no_license = {key: value for key, value in ABOUT.items() if key != "license"}
         (self.dir / "a.json").write_text(json.dumps(no_license))
@@ -399,6 +426,14 @@ class Bundle(unittest.TestCase):
         run("bundle", "--db", "study.db", status=2, folder=self.dir)
         run("bundle", "--verify", "bundle", "--db", "study.db", status=2, folder=self.dir)
         run("bundle", "--verify", "nowhere", status=2, folder=self.dir)
+        run("bundle", "--verify", "bundle", "--registration", "registration", status=2, folder=self.dir)
+        digest = run("bundle", "--db", "study.db", "--about", "study.json", "--out", "new", "--digest", "0" * 64,
+                     status=2, folder=self.dir)
+        self.assertIn("--registration", digest.stderr)
+        shutil.copy(SOURCE / "protocols/stiffness-2afc.json", self.dir / "other.json")
+        run("simulate", "other.json", "--db", "study.db", "--participants", "1", folder=self.dir)
+        two = run("bundle", "--db", "study.db", "--about", "study.json", "--out", "new", status=2, folder=self.dir)
+        self.assertIn("the trials of one protocol", two.stderr)
         self.assertFalse((self.dir / "new").exists())
         self.assertEqual([p.name for p in self.dir.iterdir() if p.name.startswith(".")], [])
 
