@@ -16,6 +16,7 @@
 #include "analysis/input/trials.h"
 #include "analysis/report/study_report.h"
 #include "analysis/text.h"
+#include "data/base/cell_name.h"
 #include "data/base/checksum.h"
 #include "data/base/markdown.h"
 #include "data/base/text.h"
@@ -158,11 +159,18 @@ std::optional<double> level_of(const TrialFields& of, std::size_t row) {
   return of.number(row, "level");
 }
 
-study::ShownTrial shown_trial(const TrialFields& of, std::size_t row, int session) {
+/// \param factors  names, of the trial's protocol
+study::ShownTrial shown_trial(const TrialFields& of, std::size_t row, int session,
+                              const std::vector<data::StoredFactor>& factors) {
   study::ShownTrial out;
+  CellName stimulus{of.text(row, "shape")};
+  for (const data::StoredFactor& factor : factors) {
+    const std::string& level = of.text(row, factor.name.c_str());
+    if (!level.empty()) stimulus.levels.emplace_back(factor.name, level);
+  }
   out.row = {session,
              of.text(row, "renderer"),
-             of.text(row, "shape"),
+             stimulus.text(),
              {of.number(row, "orientation_w"), of.number(row, "orientation_x"),
               of.number(row, "orientation_y"), of.number(row, "orientation_z")}};
   out.practice = of.flag(row, "practice");
@@ -183,8 +191,11 @@ study::ShownTrial shown_trial(const TrialFields& of, std::size_t row, int sessio
 /// The study as the check compares it, from the trials and record.json.
 StudyData study_of(const TextTable& table, const TrialFields& of, const StatedStudy& stated) {
   StudyData out;
-  for (const analysis::ProtocolText& one : stated.record.protocols)
+  std::map<std::string, std::vector<data::StoredFactor>> factors;  // by SHA-256 of the protocol
+  for (const analysis::ProtocolText& one : stated.record.protocols) {
     out.protocols.push_back({one.name, one.text, one.sha256});
+    factors[one.sha256] = data::read_stored_protocol(one.text).factors;
+  }
   std::map<std::pair<std::string, std::string>, std::size_t> known;
   std::set<std::pair<std::size_t, std::uint64_t>> sessions;
   for (std::size_t i = 0; i < table.rows.size(); ++i) {
@@ -208,7 +219,7 @@ StudyData study_of(const TextTable& table, const TrialFields& of, const StatedSt
       run.info.session = session;
       run.info.observer_sha256 = of.text(i, "observer_sha256");
     }
-    one.shown.push_back(shown_trial(of, i, session));
+    one.shown.push_back(shown_trial(of, i, session, factors[sha256]));
   }
   out.removed = stated.removed;
   return out;

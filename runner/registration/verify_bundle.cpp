@@ -139,7 +139,7 @@ class DatasetTables {
     }
     if (columns.size() + (participant.empty() ? 0 : 1) != trials_.header.size())
       faults_.push_back(name + ": has other columns than data/trials.csv");
-    std::optional<std::size_t> first;
+    std::optional<Begin> first;
     for (std::size_t row = 0; row < table.rows.size(); ++row) {
       const std::string where = name + ", row " + std::to_string(row + 1);
       const auto found =
@@ -161,10 +161,12 @@ class DatasetTables {
         row_of_.erase(found);
         continue;
       }
-      compare_times(where, value(row, "onset"), value(row, "duration"),
-                    first ? value(*first, "onset") : "", value(first.value_or(row), "elapsed"),
-                    trial);
-      if (!first) first = row;
+      compare_duration(where, value(row, "duration"), trial);
+      const Begin begin{number(value(row, "onset")), begin_of(trial)};
+      if (!first) first = begin;
+      if (!(std::fabs((begin.onset - first->onset) - (begin.elapsed - first->elapsed)) <= kTick))
+        faults_.push_back(where + ": onset is " + value(row, "onset") +
+                          ", in data/trials.csv elapsed is " + trial_field(trial, "elapsed"));
       row_of_.erase(found);
     }
   }
@@ -183,31 +185,43 @@ class DatasetTables {
     return at < trials_.header.size() ? trials_.rows[row][at] : none;
   }
 
-  /// Onset and duration, which BIDS has in place of columns of trials.csv. Onsets may be rounded
-  /// to ticks of the servo.
-  void compare_times(const std::string& where, const std::string& onset,
-                     const std::string& duration, const std::string& first_onset,
-                     const std::string& first_elapsed, const std::vector<std::string>& trial) {
-    constexpr double kTick = 2e-3;  // s
-    const auto of = [&](const char* name) {
-      const std::size_t at = trials_.column(name);
-      return at < trial.size() ? trial[at] : std::string();
-    };
-    const auto number = [](const std::string& text) {
-      double value = NAN;
-      std::from_chars(text.data(), text.data() + text.size(), value);
-      return value;
-    };
-    if (!first_onset.empty()) {
-      const double since = number(onset) - number(first_onset);
-      if (!(std::fabs(since - (number(of("elapsed")) - number(first_elapsed))) <= kTick))
-        faults_.push_back(where + ": onset is " + onset + ", in data/trials.csv elapsed is " +
-                          of("elapsed"));
-    }
+  static constexpr double kTick = 2e-3;  // s; onsets may be rounded to ticks of the servo
+
+  /// The first tick of a trial with forces on, in s: in a table of BIDS, and in trials.csv.
+  struct Begin {
+    double onset, elapsed;
+  };
+
+  static double number(const std::string& text) {
+    double value = NAN;
+    std::from_chars(text.data(), text.data() + text.size(), value);
+    return value;
+  }
+
+  std::string trial_field(const std::vector<std::string>& trial, const char* name) const {
+    const std::size_t at = trials_.column(name);
+    return at < trial.size() ? trial[at] : std::string();
+  }
+
+  /// `elapsed` is that of the last interval.
+  double begin_of(const std::vector<std::string>& trial) const {
+    const double elapsed = number(trial_field(trial, "elapsed"));
+    const std::string onsets = trial_field(trial, "interval_onsets");
+    const std::size_t end = onsets.find_last_not_of(';');
+    if (end == std::string::npos) return elapsed;
+    const std::size_t before = onsets.rfind(';', end);
+    const std::size_t begin = before == std::string::npos ? 0 : before + 1;
+    return elapsed - number(onsets.substr(begin, end + 1 - begin));
+  }
+
+  /// BIDS has it in place of a column of trials.csv.
+  void compare_duration(const std::string& where, const std::string& duration,
+                        const std::vector<std::string>& trial) {
     const bool of_task = trials_.column("task") < trials_.header.size();
-    if (!of_task && of("timed_out") == "0" && duration != of("response_time"))
+    const std::string response_time = trial_field(trial, "response_time");
+    if (!of_task && trial_field(trial, "timed_out") == "0" && duration != response_time)
       faults_.push_back(where + ": duration is " + duration +
-                        ", in data/trials.csv response_time " + of("response_time"));
+                        ", in data/trials.csv response_time " + response_time);
   }
 
   const TextTable& trials_;
