@@ -154,6 +154,38 @@ class Factors(command_case.CommandCase):
         self.palpate("analyze", "--db", db, "--report", report)
         self.assertIn("Factors: compare, stiffness, comparison", report.read_text())
 
+    def test_registered_checked_and_bundled(self):
+        first, second = SMALL["blocks"]
+        compare = {"name": "c", "task": "compare", "stimuli": ["plate"], "standard": "plate", **LEVEL, "factors": ["surface"],
+                   "mixing": "blocked", "procedure": {"kind": "constant", "levels": [200, 400], "repetitions": 2}}
+        study = {**SMALL, "blocks": [first, {**compare, "question": "Which?"}, second]}
+        protocol = self.file("p.json", study)
+        self.palpate("plan", "--exponent-effect", 30, "--trials", 6, "--participants", "3-9", "--studies", 100,
+                     "--json", self.dir / "plan.json")
+        name = "effects.exponent.a.surface:size.p"
+        hypotheses = self.file("h.json", [{"id": "H1", "text": "It depends.", "corroborated": f"{name} < alpha",
+                                           "refuted": f"{name} > 0.5"}])
+        out = self.dir / "registration"
+        self.palpate("register", protocol, "--plan", self.dir / "plan.json", "--hypotheses", hypotheses, "--out", out,
+                     "--participants", 4, "--studies", 20)
+        text = (out / "registration.md").read_text()
+        for words in ("factor surface (smooth and rough); trials mixed in block a; one cell after the other, in the order of a "
+                      "Williams' square, in block c", "3 blocks of trials", "between the first level of the factor surface"):
+            self.assertIn(words, text)
+        self.assertNotRegex(text, r"\| H1 \| no effect \|[^|]*\|[^|]*\| 20 of 20 \|")  # it finds the effect's p
+        db = self.simulated(study, "--participants", 4)
+        self.palpate("check", out, "--db", db, "--json", self.dir / "check.json")
+        found = {one["id"]: one["finding"] for one in json.loads((self.dir / "check.json").read_text())["points"]}
+        self.assertEqual(found["order"], "as registered")
+        self.assertNotIn("deviation", found.values())
+        about = self.file("about.json", {"version": 1, "authors": [{"name": "Ada"}], "license": "CC0-1.0"})
+        for form in ("bids", "psych-ds"):
+            bundle = self.dir / form
+            self.palpate("bundle", "--db", db, "--registration", out, "--about", about, "--out", bundle, "--format", form)
+            said = self.palpate("bundle", "--verify", bundle).stdout
+            self.assertNotIn("DIFFERS", said)
+            self.assertIn("Run as registered", said)
+
 
 if __name__ == "__main__":
     unittest.main()
