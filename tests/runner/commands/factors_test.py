@@ -155,12 +155,10 @@ class Factors(command_case.CommandCase):
         self.assertIn("Factors: compare, stiffness, comparison", report.read_text())
 
     def test_registered_checked_and_bundled(self):
-        first, second = SMALL["blocks"]
-        compare = {"name": "c", "task": "compare", "stimuli": ["plate"], "standard": "plate", **LEVEL, "factors": ["surface"],
-                   "mixing": "blocked", "procedure": {"kind": "constant", "levels": [200, 400], "repetitions": 2}}
-        study = {**SMALL, "blocks": [first, {**compare, "question": "Which?"}, second]}
+        first, second = ({**block, "procedure": {**LEVEL["procedure"], "repetitions": 1}} for block in SMALL["blocks"])
+        study = {**SMALL, "blocks": [first, {**first, "name": "c", "factors": ["surface"], "mixing": "blocked"}, second]}
         protocol = self.file("p.json", study)
-        self.palpate("plan", "--exponent-effect", 30, "--trials", 6, "--participants", "3-9", "--studies", 100,
+        self.palpate("plan", "--exponent-effect", 30, "--trials", 3, "--participants", "3-9", "--studies", 100,
                      "--json", self.dir / "plan.json")
         name = "effects.exponent.a.surface:size.p"
         hypotheses = self.file("h.json", [{"id": "H1", "text": "It depends.", "corroborated": f"{name} < alpha",

@@ -236,7 +236,7 @@ class Bundle(Study):
         return study / "out"
 
     def test_it_verifies_and_reproduces(self):
-        for name, more in (("stairs", ()), ("rating", ("--format", "bids"))):
+        for name, more in (("stairs", ("--format", "bids")), ("rating", ())):
             out = self.bundle(name, *more)
             self.assertNotIn("DIFFERS", self.palpate("bundle", "--verify", out).stdout)
             done = subprocess.run(["sh", out / "reproduce.sh"], env={"PALPATE": str(PALPATE), "PATH": "/usr/bin:/bin"},
