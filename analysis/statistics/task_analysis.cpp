@@ -170,7 +170,9 @@ const protocols::ProcedureSpec* spec_of(const Track& track, const StudyTrial& tr
 /// Sets procedure and reversals of a track with a known spec.
 void replay(Track& track, const StudyTrial& trial, const StudyTable& table,
             const protocols::ProcedureSpec& spec, int number) {
-  if (std::holds_alternative<protocols::ConstantStimuli>(spec)) return;
+  if (std::holds_alternative<protocols::ConstantStimuli>(spec) ||
+      std::holds_alternative<protocols::Asked>(spec))
+    return;  // they estimate nothing
   const auto* const staircase = std::get_if<protocols::Staircase>(&spec);
   TrackProcedure result;
   result.spec = spec;
@@ -290,14 +292,6 @@ LevelFigures figures_of(const PsychometricFit& fit, const PsychometricModel& mod
           found.pse_ci95, found.jnd_ci95, found.weber_fraction_ci95};
 }
 
-/// The levels that are easier in an adaptive procedure; nullopt: it is not adaptive.
-std::optional<protocols::Easier> easier_of_adaptive(const protocols::ProcedureSpec& spec) {
-  if (const auto* staircase = std::get_if<protocols::Staircase>(&spec)) return staircase->easier;
-  if (const auto* quest = std::get_if<protocols::QuestPlus>(&spec)) return quest->function.easier;
-  if (const auto* limits = std::get_if<protocols::Limits>(&spec)) return limits->easier;
-  return std::nullopt;
-}
-
 /// The procedures of a trial's block; empty: none, or the source has no protocol.
 const std::vector<protocols::ProcedureSpec>& specs_of(const StudyTrial& trial,
                                                       const StudyTable& table) {
@@ -313,7 +307,7 @@ std::optional<protocols::Easier> expected_easier(const TaskCell& cell, const Tri
   if (cell.task == "compare" && above != below) return above ? Easier::higher : Easier::lower;
   for (const StudyTrial* trial : trials) {
     for (const protocols::ProcedureSpec& spec : specs_of(*trial, context.table)) {
-      if (const auto easier = easier_of_adaptive(spec)) return easier;
+      if (const auto easier = protocols::easier_of(spec)) return easier;
     }
     const protocols::BlockProcedures* const block = block_of(*trial, context.table);
     if (cell.task == "compare" && !cell.same_different && block != nullptr)
@@ -408,14 +402,6 @@ bool equal_ratios(const std::vector<LevelCount>& counts) {
   return true;
 }
 
-/// The scale of an adaptive procedure's levels; nullopt: it is not adaptive.
-std::optional<protocols::LevelScale> scale_of_adaptive(const protocols::ProcedureSpec& spec) {
-  if (const auto* staircase = std::get_if<protocols::Staircase>(&spec)) return staircase->scale;
-  if (const auto* quest = std::get_if<protocols::QuestPlus>(&spec)) return quest->function.scale;
-  if (const auto* limits = std::get_if<protocols::Limits>(&spec)) return limits->scale;
-  return std::nullopt;
-}
-
 /// Scale of the functions of a cell's trials.
 LevelScale scale_of(const Trials& trials, const Context& context) {
   if (context.settings.scale) return *context.settings.scale;
@@ -423,7 +409,7 @@ LevelScale scale_of(const Trials& trials, const Context& context) {
   bool adaptive = false;
   for (const StudyTrial* trial : trials) {
     for (const protocols::ProcedureSpec& spec : specs_of(*trial, context.table)) {
-      const std::optional<LevelScale> scale = scale_of_adaptive(spec);
+      const std::optional<LevelScale> scale = protocols::scale_of(spec);
       if (scale == LevelScale::linear) return LevelScale::linear;
       adaptive |= scale.has_value();
     }
@@ -715,12 +701,6 @@ const protocols::BlockProcedures* block_of(const StudyTrial& trial, const StudyT
   if (protocol == table.procedures.end()) return nullptr;
   const auto block = protocol->second.find(trial.block_name);
   return block == protocol->second.end() ? nullptr : &block->second;
-}
-
-const char* kind_of(const protocols::ProcedureSpec& spec) {
-  if (std::holds_alternative<protocols::Staircase>(spec)) return "staircase";
-  if (std::holds_alternative<protocols::QuestPlus>(spec)) return "quest_plus";
-  return std::holds_alternative<protocols::Limits>(spec) ? "limits" : "constant";
 }
 
 std::vector<Track> tracks_of(const std::vector<const StudyTrial*>& trials,

@@ -121,9 +121,6 @@ struct TrackProcedure {
   std::optional<double> target, fitted_level;
 };
 
-const char* kind_of(
-    const protocols::ProcedureSpec& spec);  ///< name in protocols: "staircase", ... ...
-
 /// The procedure of a trial's block; nullptr: the source has no protocol.
 const protocols::BlockProcedures* block_of(const StudyTrial& trial, const StudyTable& table);
 

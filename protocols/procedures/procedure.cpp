@@ -152,6 +152,27 @@ Estimate StaircaseRun::estimate() const {
   return result;
 }
 
+AskedRun::AskedRun(const Asked& spec, std::uint64_t seed)
+    : spec_(spec), start_(Random(seed, {0xa5}).unit()) {}
+
+std::optional<double> AskedRun::next_level() const {
+  if (trials_ >= spec_.stop_trials) return std::nullopt;
+  double share = start_, digit = 0.5;
+  for (int n = trials_; n > 0; n /= 2, digit /= 2) share += n % 2 == 1 ? digit : 0;
+  if (share >= 1) share -= 1;
+  const double low = scale_position(spec_.scale, spec_.min);
+  const double high = scale_position(spec_.scale, spec_.max);
+  return std::clamp(level_at(spec_.scale, low + share * (high - low)), spec_.min, spec_.max);
+}
+
+void AskedRun::record(const Response& /*response*/) { ++trials_; }
+
+Estimate AskedRun::estimate() const {
+  Estimate result;
+  result.trials = trials_;
+  return result;
+}
+
 /// Tables that are constant over the trials.
 struct QuestPlusTables {
   QuestPlus spec;
@@ -348,14 +369,15 @@ Estimate QuestPlusRun::estimate() const {
 
 namespace {
 
-using Run = std::variant<ConstantStimuliRun, StaircaseRun, QuestPlusRun, LimitsRun>;
+using Run = std::variant<ConstantStimuliRun, StaircaseRun, QuestPlusRun, LimitsRun, AskedRun>;
 
 Run begin_run(const ProcedureSpec& spec, std::uint64_t seed) {
   if (const auto* constant = std::get_if<ConstantStimuli>(&spec))
     return ConstantStimuliRun(*constant, seed);
   if (const auto* staircase = std::get_if<Staircase>(&spec)) return StaircaseRun(*staircase);
   if (const auto* quest = std::get_if<QuestPlus>(&spec)) return QuestPlusRun(*quest);
-  return LimitsRun(std::get<Limits>(spec), seed);
+  if (const auto* limits = std::get_if<Limits>(&spec)) return LimitsRun(*limits, seed);
+  return AskedRun(std::get<Asked>(spec), seed);
 }
 
 bool is_same(const ParameterGrid& a, const ParameterGrid& b) {
@@ -442,11 +464,8 @@ double level_of_success(const PsychometricParticipant& participant, double share
   return psychometric_level(participant.function, parameters, core);
 }
 
-LevelScale scale_of(const ProcedureSpec& spec) {
-  if (const auto* staircase = std::get_if<Staircase>(&spec)) return staircase->scale;
-  if (const auto* quest = std::get_if<QuestPlus>(&spec)) return quest->function.scale;
-  if (const auto* limits = std::get_if<Limits>(&spec)) return limits->scale;
-  return LevelScale::linear;
+double place_of(const ProcedureSpec& spec, double level) {
+  return scale_position(scale_of(spec).value_or(LevelScale::linear), level);
 }
 
 }  // namespace
@@ -480,7 +499,7 @@ struct CourseParticipant {
 
 std::optional<CourseParticipant> course_participant(const ProcedureSpec& spec,
                                                     const Procedure& so_far) {
-  const auto place = [&](double level) { return scale_position(scale_of(spec), level); };
+  const auto place = [&](double level) { return place_of(spec, level); };
   const std::optional<double> known = so_far.estimate().threshold;
   if (const auto* const stairs = std::get_if<Staircase>(&spec)) {
     if (!stairs->stop_reversals) return std::nullopt;
@@ -509,7 +528,7 @@ double expected_trials(const ProcedureSpec& spec, const Procedure& so_far) {
     Random random(1, {static_cast<std::uint64_t>(i)});
     Procedure course = so_far;
     while (const auto level = course.next_level()) {
-      const double position = scale_position(scale_of(spec), *level);
+      const double position = place_of(spec, *level);
       course.record({*level, participant->succeeds(position, random)});
       ++trials;
     }
@@ -521,7 +540,7 @@ Recovery simulate_recovery(const ProcedureSpec& spec, const PsychometricParticip
                            int participants, std::uint64_t seed) {
   Recovery result;
   result.participants = participants;
-  const double truth = scale_position(scale_of(spec), true_threshold(spec, participant));
+  const double truth = place_of(spec, true_threshold(spec, participant));
   std::vector<double> errors;
   double trials = 0;
   for (int i = 0; i < participants; ++i) {
@@ -535,7 +554,7 @@ Recovery simulate_recovery(const ProcedureSpec& spec, const PsychometricParticip
       ++result.without_estimate;
       continue;
     }
-    errors.push_back(scale_position(scale_of(spec), *estimate.threshold) - truth);
+    errors.push_back(place_of(spec, *estimate.threshold) - truth);
   }
   const auto n = static_cast<double>(errors.size());
   result.mean_trials = trials / participants;

@@ -95,6 +95,21 @@ class StaircaseRun {
   int trials_ = 0, at_limit_ = 0;
 };
 
+/// The levels of its own are points of van der Corput's sequence on the scale, from a random start.
+class AskedRun {
+ public:
+  AskedRun(const Asked& spec, std::uint64_t seed);
+
+  std::optional<double> next_level() const;
+  void record(const Response& response);
+  Estimate estimate() const;  ///< counts only: the analysis estimates the threshold
+
+ private:
+  Asked spec_;
+  double start_;  ///< share of the range
+  int trials_ = 0;
+};
+
 struct QuestPlusTables;
 
 /// Watson 2017, "QUEST+: A general multidimensional Bayesian adaptive psychometric method".
@@ -139,7 +154,7 @@ class Procedure {
   const std::vector<Response>& history() const { return history_; }
 
  private:
-  std::variant<ConstantStimuliRun, StaircaseRun, QuestPlusRun, LimitsRun> run_;
+  std::variant<ConstantStimuliRun, StaircaseRun, QuestPlusRun, LimitsRun, AskedRun> run_;
   std::vector<Response> history_;
 };
 

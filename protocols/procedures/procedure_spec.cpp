@@ -1,6 +1,7 @@
 #include "protocols/procedures/procedure_spec.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "protocols/procedures/procedure.h"
@@ -37,6 +38,28 @@ double step_ratio_for(double target, int down) {
   return harder / (1 - harder);
 }
 
+const char* kind_of(const ProcedureSpec& spec) {
+  static constexpr std::array kKinds = {"constant", "staircase", "quest_plus", "limits", "ask"};
+  static_assert(kKinds.size() == std::variant_size_v<ProcedureSpec>);
+  return kKinds[spec.index()];
+}
+
+std::optional<LevelScale> scale_of(const ProcedureSpec& spec) {
+  if (const auto* staircase = std::get_if<Staircase>(&spec)) return staircase->scale;
+  if (const auto* quest = std::get_if<QuestPlus>(&spec)) return quest->function.scale;
+  if (const auto* limits = std::get_if<Limits>(&spec)) return limits->scale;
+  if (const auto* asked = std::get_if<Asked>(&spec)) return asked->scale;
+  return std::nullopt;
+}
+
+std::optional<Easier> easier_of(const ProcedureSpec& spec) {
+  if (const auto* staircase = std::get_if<Staircase>(&spec)) return staircase->easier;
+  if (const auto* quest = std::get_if<QuestPlus>(&spec)) return quest->function.easier;
+  if (const auto* limits = std::get_if<Limits>(&spec)) return limits->easier;
+  if (const auto* asked = std::get_if<Asked>(&spec)) return asked->easier;
+  return std::nullopt;
+}
+
 std::vector<double> levels_to_check(const ProcedureSpec& spec) {
   if (const auto* constant = std::get_if<ConstantStimuli>(&spec)) return constant->levels;
   if (const auto* quest = std::get_if<QuestPlus>(&spec)) return quest->levels;
@@ -46,6 +69,7 @@ std::vector<double> levels_to_check(const ProcedureSpec& spec) {
     levels.insert(levels.end(), descending.begin(), descending.end());
     return levels;
   }
+  if (const auto* asked = std::get_if<Asked>(&spec)) return {asked->min, asked->max};
   const auto& staircase = std::get<Staircase>(spec);
   return {staircase.min, staircase.start, staircase.max};
 }
@@ -57,6 +81,8 @@ std::size_t most_trials(const ProcedureSpec& spec) {
     return static_cast<std::size_t>(quest->stop_trials);
   if (const auto* limits = std::get_if<Limits>(&spec))
     return static_cast<std::size_t>(limits->series) * series_levels(*limits, true, 0).size();
+  if (const auto* asked = std::get_if<Asked>(&spec))
+    return static_cast<std::size_t>(asked->stop_trials);
   return static_cast<std::size_t>(std::get<Staircase>(spec).stop_trials);
 }
 

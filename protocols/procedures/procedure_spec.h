@@ -73,7 +73,23 @@ struct Limits {
   int jitter_steps = 0;  ///< a series starts up to so many steps inside, at random
 };
 
-using ProcedureSpec = std::variant<ConstantStimuli, Staircase, QuestPlus, Limits>;
+/// A program chooses every level, within the range. Where it does not answer, levels come from a
+/// sequence that covers the scale evenly.
+struct Asked {
+  double min = 0, max = 1;
+  LevelScale scale = LevelScale::linear;
+  Easier easier = Easier::higher;
+  int stop_trials = 60;
+};
+
+using ProcedureSpec = std::variant<ConstantStimuli, Staircase, QuestPlus, Limits, Asked>;
+
+/// "constant", "staircase", ...: as a protocol names it.
+const char* kind_of(const ProcedureSpec& spec);
+/// Of its levels; nullopt: constant stimuli, which have none.
+std::optional<LevelScale> scale_of(const ProcedureSpec& spec);
+/// The levels that are easier; nullopt: constant stimuli do not say.
+std::optional<Easier> easier_of(const ProcedureSpec& spec);
 
 /// Levels that a procedure may request: all of them, or (Staircase) its start and the ends of its
 /// range. Refuse a stimulus that a device cannot show at one of these before the first trial.

@@ -106,6 +106,22 @@ bool is_adaptive(const TaskBlock& block) {
   });
 }
 
+const TaskBlock* block_that_asks(const Protocol& protocol) {
+  const auto asks = [](const ProcedureSpec& spec) { return std::holds_alternative<Asked>(spec); };
+  const auto found = std::ranges::find_if(protocol.blocks, [&](const TaskBlock& block) {
+    return std::ranges::any_of(block.procedures, asks);
+  });
+  if (found != protocol.blocks.end()) return &*found;
+  for (const auto& group : protocol.group_protocols) {
+    if (const TaskBlock* const block = block_that_asks(*group)) return block;
+  }
+  return nullptr;
+}
+
+const ProcedureSpec* procedure_of(const TaskBlock& block, const Trial& trial) {
+  return tracks_of(block)[static_cast<std::size_t>(trial.track - first_track(block))].procedure;
+}
+
 long long most_trials_of(const TaskBlock& block) {
   if (block.criterion) return block.criterion->most_trials;
   if (block.task == TaskKind::external) return block.repetitions;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "protocols/protocol.h"
+#include "protocols/schedule.h"
 
 namespace palpate::protocols {
 
@@ -20,6 +21,10 @@ int block_orders(const Protocol& protocol);
 bool is_external(const Protocol& protocol);
 /// Whether answers choose the block's levels.
 bool is_adaptive(const TaskBlock& block);
+/// The first block, of any group, that a program must choose levels for; nullptr: none.
+const TaskBlock* block_that_asks(const Protocol& protocol);
+/// The procedure that chooses the level of a trial of the block; nullptr: none.
+const ProcedureSpec* procedure_of(const TaskBlock& block, const Trial& trial);
 /// The most trials of a participant in a block, not counting unanswered ones.
 long long most_trials_of(const TaskBlock& block);
 /// The trials of a participant that adaptive blocks usually take.

@@ -72,14 +72,6 @@ double guesses_of(const TaskBlock& block, const TypicalSettings& settings, bool 
   return both_sides ? settings.lapse : 1.0 / block.intervals;
 }
 
-/// constant stimuli: linear
-LevelScale procedure_scale(const ProcedureSpec& spec) {
-  if (const auto* staircase = std::get_if<Staircase>(&spec)) return staircase->scale;
-  if (const auto* quest = std::get_if<QuestPlus>(&spec)) return quest->function.scale;
-  if (const auto* limits = std::get_if<Limits>(&spec)) return limits->scale;
-  return LevelScale::linear;
-}
-
 }  // namespace
 
 std::string level_text(double level) {
@@ -198,13 +190,6 @@ Protocol with_all_levels(const Protocol& protocol) {
   return all;
 }
 
-std::optional<Easier> easier_of(const ProcedureSpec& spec) {
-  if (const auto* staircase = std::get_if<Staircase>(&spec)) return staircase->easier;
-  if (const auto* quest = std::get_if<QuestPlus>(&spec)) return quest->function.easier;
-  if (const auto* limits = std::get_if<Limits>(&spec)) return limits->easier;
-  return std::nullopt;
-}
-
 PsychometricParticipant typical_participant(const Protocol& protocol, const TaskBlock& block,
                                             const TypicalSettings& settings) {
   PsychometricParticipant participant;
@@ -215,7 +200,7 @@ PsychometricParticipant typical_participant(const Protocol& protocol, const Task
     const std::optional<Easier> easier = easier_of(procedure);
     if (!easier) continue;
     participant.function.easier = *easier;
-    participant.function.scale = procedure_scale(procedure);
+    participant.function.scale = scale_of(procedure).value_or(LevelScale::linear);
     break;
   }
   const LevelScale scale = participant.function.scale;

@@ -58,7 +58,4 @@ struct TypicalSettings {
 PsychometricParticipant typical_participant(const Protocol& protocol, const TaskBlock& block,
                                             const TypicalSettings& settings = {});
 
-/// The direction in which a procedure's levels get easier; nullopt for constant stimuli.
-std::optional<Easier> easier_of(const ProcedureSpec& spec);
-
 }  // namespace palpate::protocols

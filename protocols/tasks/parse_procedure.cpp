@@ -199,7 +199,25 @@ Limits read_limits(ObjectReader& reader) {
   return spec;
 }
 
-enum class ProcedureKind { none, constant, staircase, quest_plus, limits };
+Asked read_asked(ObjectReader& reader) {
+  Asked spec;
+  read_scale(reader, spec.scale);
+  read_easier(reader, spec.easier);
+  const NumberRange& range = level_range(spec.scale);
+  reader.number("min", spec.min, range, Presence::required);
+  reader.number("max", spec.max, range, Presence::required);
+  reader.section(
+      "stop",
+      [&](ObjectReader& stop) {
+        stop.integer("trials", spec.stop_trials, kTrials, Presence::required);
+      },
+      Presence::required);
+  if (!(spec.min < spec.max) && reader.has("min") && reader.has("max"))
+    reader.faults().add(reader.pointer("max"), "expected more than min");
+  return spec;
+}
+
+enum class ProcedureKind { none, constant, staircase, quest_plus, limits, ask };
 
 ProcedureSpec read_kind(ObjectReader& reader, ProcedureKind kind) {
   switch (kind) {
@@ -209,6 +227,8 @@ ProcedureSpec read_kind(ObjectReader& reader, ProcedureKind kind) {
       return read_quest(reader);
     case ProcedureKind::limits:
       return read_limits(reader);
+    case ProcedureKind::ask:
+      return read_asked(reader);
     default:
       return read_constant(reader);
   }
@@ -223,7 +243,8 @@ std::optional<ProcedureSpec> read_procedure(ObjectReader& reader) {
                 {{"constant", ProcedureKind::constant},
                  {"staircase", ProcedureKind::staircase},
                  {"quest_plus", ProcedureKind::quest_plus},
-                 {"limits", ProcedureKind::limits}},
+                 {"limits", ProcedureKind::limits},
+                 {"ask", ProcedureKind::ask}},
                 Presence::required);
   if (kind == ProcedureKind::none) return std::nullopt;  // other keys depend on it
   ProcedureSpec spec = read_kind(reader, kind);

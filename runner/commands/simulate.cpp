@@ -18,6 +18,7 @@
 
 #include "data/base/text.h"
 #include "protocols/parse.h"
+#include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/study_options.h"
@@ -217,6 +218,12 @@ int simulate_command(const std::vector<std::string>& args) {
   for (const std::string& text : limited.texts)
     std::fprintf(stderr, "%s\n", printable(text).c_str());
   plan.event = limited.event;
+  if (const protocols::TaskBlock* const asks = protocols::block_that_asks(protocol);
+      asks != nullptr && plan.advisor.empty())
+    std::fprintf(stderr,
+                 "block '%s' asks a program for its levels: without --ask they cover the range "
+                 "evenly\n",
+                 printable(asks->name).c_str());
   if (!store) store.emplace(open());
   warn_of_exposure(store->path());
 

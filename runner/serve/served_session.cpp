@@ -8,6 +8,7 @@
 
 #include "data/base/text.h"
 #include "protocols/json_document.h"
+#include "protocols/tasks/block_order.h"
 #include "runner/safety/fault_signals.h"
 #include "runner/session/session_scenes.h"
 #include "stimuli/shapes.h"
@@ -43,6 +44,9 @@ std::string unserved(const protocols::Protocol& protocol) {
     if (!page.items.empty() || page.kind == protocols::PageSpec::Kind::consent)
       return "page '" + page.name + "' has questions, which need palpate run";
   }
+  if (const TaskBlock* const asks = protocols::block_that_asks(protocol))
+    return "block '" + asks->name +
+           "' asks a program for its levels, which needs palpate run --ask";
   for (const TaskBlock& block : protocol.blocks) {
     const std::string name = "block '" + block.name + "' ";
     if (block.confidence) return name + "asks for confidence, which needs palpate run";

@@ -14,8 +14,10 @@
 #include <stdexcept>
 #include <utility>
 
+#include "data/base/cell_name.h"
 #include "data/base/json_text.h"
 #include "data/base/text.h"
+#include "protocols/groups.h"
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
 
@@ -40,7 +42,9 @@ AdvisorJson json_of(const data::TrialRecord& record) {
           {"success", task.success},
           {"correct", record.correct},
           {"answered", !record.timed_out},
-          {"catch_trial", task.catch_trial}};
+          {"catch_trial", task.catch_trial},
+          {"response", record.timed_out ? AdvisorJson() : AdvisorJson(record.response)},
+          {"response_time_s", record.response_time}};
 }
 
 int milliseconds_until(steady_clock::time_point until) {
@@ -79,7 +83,9 @@ std::string socket_fault(const std::string& path) {
 
 SocketAdvisor::SocketAdvisor(const protocols::Protocol& protocol, Settings settings,
                              const std::vector<data::TrialRecord>& history)
-    : protocol_(protocol), settings_(std::move(settings)) {
+    : protocol_(protocols::protocol_of(protocol, settings.participant)),
+      group_(protocol.groups.any() ? protocol.groups.name(settings.participant) : ""),
+      settings_(std::move(settings)) {
   for (const data::TrialRecord& record : history) {
     if (!record.task.of_block()) continue;
     history_ += (history_.empty() ? "" : ",") + json_of(record).dump();
@@ -96,6 +102,7 @@ bool SocketAdvisor::connect() {
                     {"version", 1},
                     {"protocol", protocol_.name},
                     {"participant", settings_.participant},
+                    {"group", group_.empty() ? AdvisorJson() : AdvisorJson(group_)},
                     {"session", settings_.session}};
   std::string line = line_of(begin);
   line.resize(line.size() - 2);  // "}\n"
@@ -204,11 +211,18 @@ std::optional<double> SocketAdvisor::ask(const protocols::Trial& next) {
   const std::vector<double> levels = protocols::levels_of(block);
   const auto until = steady_clock::now() + std::chrono::duration_cast<steady_clock::duration>(
                                                std::chrono::duration<double>(settings_.time_out));
+  const CellName stimulus =
+      cell_name(protocol_.stimuli[static_cast<std::size_t>(next.stimulus)].name);
+  AdvisorJson factors = AdvisorJson::object();
+  for (const auto& [factor, level] : stimulus.levels) factors[factor] = level;
+  const auto scale = protocols::scale_of(*protocols::procedure_of(block, next));
   if (!send(line_of({{"type", "ask"},
                      {"trial", next.trial},
                      {"block", block.name},
                      {"track", next.track},
-                     {"stimulus", protocol_.stimuli[static_cast<std::size_t>(next.stimulus)].name},
+                     {"stimulus", stimulus.base},
+                     {"factors", factors},
+                     {"scale", to_string(*scale)},
                      {"renderer", protocols::to_string(next.renderer)},
                      {"path", block.level->pointer},
                      {"least", levels.front()},

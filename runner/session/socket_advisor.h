@@ -1,15 +1,18 @@
 #pragma once
 // Levels proposed by a program at a Unix domain socket on this machine: one JSON object a line.
 //
-//   to it    {"type": "begin", "version": 1, "protocol": NAME, "participant": NUMBER, "session": S,
-//             "history": [TRIAL, ...]}              once a connection; trials of blocks on record
+//   to it    {"type": "begin", "version": 1, "protocol": NAME, "participant": NUMBER,
+//             "group": NAME, "session": S, "history": [TRIAL, ...]}
+//                                                   once a connection; trials of blocks on record
 //            {"type": "ask", "trial": T, "block": NAME, "track": K, "stimulus": NAME,
-//             "renderer": NAME, "path": POINTER, "least": X, "most": Y, "own": LEVEL}
+//             "factors": {NAME: LEVEL}, "scale": "linear", "renderer": NAME, "path": POINTER,
+//             "least": X, "most": Y, "own": LEVEL}
 //            {"type": "tell", TRIAL...}             after every trial of an adaptive block
 //            {"type": "refused", "trial": T, "message": TEXT}
 //   from it  {"type": "level", "trial": T, "level": X}
 //
-// TRIAL: "trial", "block", "track", "level", "success", "correct", "answered", "catch_trial".
+// TRIAL: "trial", "block", "track", "level", "success", "correct", "answered", "catch_trial",
+// "response" and "response_time_s". "group" is null without groups, "response" without an answer.
 // Answers to earlier questions are ignored. A program that does not answer in time, or sends an
 // invalid line, is asked again before the next trial; after a closed connection or an overlong
 // line, the session connects again.
@@ -74,7 +77,8 @@ class SocketAdvisor final : public LevelAdvisor {
   std::optional<double> level_in(const std::string& line, const protocols::Trial& next);
   std::string refusal(const std::string& message, int trial) const;
 
-  const protocols::Protocol& protocol_;
+  const protocols::Protocol& protocol_;  ///< of the participant's group
+  std::string group_;                    ///< "": none
   Settings settings_;
   std::string history_;  ///< of all trials so far, as JSON, separated by commas
   int socket_ = -1;

@@ -100,6 +100,13 @@ std::string joined_in_order(const std::vector<std::string>& names) {
   return out;
 }
 
+/// Whether a program chooses the level of the next trial: any is as expected.
+bool is_level_asked(const protocols::SessionPlan& plan) {
+  if (!plan.tracks() || !plan.next().level) return false;
+  return std::holds_alternative<protocols::Asked>(
+      *protocols::procedure_of(plan.block(), plan.next()));
+}
+
 }  // namespace
 
 std::string to_line(const OrderRow& row) {
@@ -133,7 +140,10 @@ ExpectedTrials expected_trials(const Protocol& all, int participant_number,
     protocols::SessionPlan plan(protocol, participant_number, session);
     for (const ShownTrial& one : shown) {
       if (one.row.session != session || plan.finished()) continue;
-      if (!plan.next().practice) out.rows.push_back(row_of(protocol, plan.next()));
+      if (!plan.next().practice) {
+        out.rows.push_back(row_of(protocol, plan.next()));
+        if (one.row.task && is_level_asked(plan)) out.rows.back().task->level = one.row.task->level;
+      }
       plan.answered(one.outcome);
     }
     out.complete = out.complete && plan.finished();

@@ -168,6 +168,12 @@ std::string words(const protocols::Limits& spec) {
          " to " + level_text(spec.high) + " and back, steps of " + level_text(spec.step);
 }
 
+std::string words(const protocols::Asked& spec) {
+  return "a program is asked for levels from " + level_text(spec.min) + " to " +
+         level_text(spec.max) + " (--ask); ends after " + std::to_string(spec.stop_trials) +
+         " trials";
+}
+
 /// Answers as a participant whose threshold is in the middle of the levels.
 bool succeeds(const protocols::Protocol& protocol, const protocols::TaskBlock& block,
               const protocols::Trial& trial, Random& random) {
@@ -204,13 +210,18 @@ protocols::PsychometricParticipant participant_for(const protocols::Protocol& pr
   return participant;
 }
 
+bool has_no_estimate(const protocols::ProcedureSpec& spec) {
+  return std::holds_alternative<protocols::ConstantStimuli>(spec) ||
+         std::holds_alternative<protocols::Asked>(spec);
+}
+
 std::vector<RecoveredProcedure> recovered(const protocols::Protocol& protocol, int participants,
                                           std::uint64_t seed) {
   std::vector<RecoveredProcedure> all;
   for (const protocols::TaskBlock& block : protocol.blocks) {
     for (std::size_t i = 0; i < block.procedures.size(); ++i) {
       const protocols::ProcedureSpec& procedure = block.procedures[i];
-      if (block.practice || std::holds_alternative<protocols::ConstantStimuli>(procedure)) continue;
+      if (block.practice || has_no_estimate(procedure)) continue;
       const auto participant = participant_for(protocol, block, procedure);
       all.push_back({&block, i + 1, participant, protocols::true_threshold(procedure, participant),
                      protocols::simulate_recovery(procedure, participant, participants, seed)});

@@ -45,7 +45,7 @@ TEST(ParseProcedure, ReadsEveryExampleOfTheReadme) {
     ++count;
     from = next == std::string::npos ? next : next + 1;
   }
-  EXPECT_EQ(count, 5);
+  EXPECT_EQ(count, 6);
 }
 
 TEST(ParseProcedure, ReadsAStaircaseWithItsDefaults) {
@@ -113,6 +113,11 @@ TEST(ParseProcedure, NamesThePlaceOfEveryFault) {
       {R"({"kind": "limits", "low": 0, "high": 10, "step": 0.001})", {"/step"}},
       {R"({"kind": "limits", "low": 0, "high": 3, "step": 1, "jitter_steps": 3})", {"/step"}},
       {R"({"kind": "limits", "low": 0, "high": 3, "step": 1, "serie": 3})", {"/serie"}},
+      {R"({"kind": "ask", "min": 2, "max": 1, "stop": {"trials": 5}})", {"/max"}},
+      {R"({"kind": "ask", "min": 0, "max": 1, "scale": "log", "stop": {"trials": 5}})", {"/min"}},
+      {R"({"kind": "ask", "min": 1, "max": 2})", {"/stop"}},
+      {R"({"kind": "ask", "min": 1, "max": 2, "stop": {"trials": 0}, "start": 1})",
+       {"/start", "/stop/trials"}},
   };
   for (const auto& [text, places] : bad) {
     ReadProcedure read = read_text(text);

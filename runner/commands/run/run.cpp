@@ -288,6 +288,10 @@ int run_command(const std::vector<std::string>& args) {
     throw UsageError(
         "this protocol has a block of the task 'external': palpate serve runs it, with the program "
         "that chooses the stimuli");
+  if (const protocols::TaskBlock* const asks = protocols::block_that_asks(admission.protocol);
+      asks != nullptr && settings.advisor.empty())
+    throw UsageError("block '" + asks->name +
+                     "' asks a program for its levels: expected --ask SOCKET");
   settings.participant = admission.participant;
   protocols::Protocol& protocol = admission.protocol;
   translate_texts(settings, admission);

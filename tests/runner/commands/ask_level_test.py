@@ -2,6 +2,9 @@
 Usage: ask_level_test.py PALPATE propose_levels.py"""
 
 import json
+import math
+import os
+import pathlib
 import socket
 import sqlite3
 import subprocess
@@ -70,7 +73,7 @@ def level(message, value):
     return (json.dumps({"type": "level", "trial": message["trial"], "level": value}) + "\n").encode()
 
 
-class AskLevel(CommandCase):
+class Asking(CommandCase):
     def setUp(self):
         super().setUp()
         self.protocol = self.file("asked.json", PROTOCOL)
@@ -99,6 +102,8 @@ class AskLevel(CommandCase):
         base.close()
         return found
 
+
+class AskLevel(Asking):
     def test_levels_are_requested_presented_and_reported(self):
         program, db = self.asked(lambda message: level(message, 310.5 + message["trial"]))
         asked = program.of("ask")
@@ -225,6 +230,94 @@ class AskLevel(CommandCase):
         for time_out in ("0", "-1", "nan", "1000"):
             self.assertIn("--ask-time-out-s", self.simulate(db, "--ask", self.dir / "socket", "--ask-time-out-s", time_out,
                                                             status=2).stderr)
+
+
+ASKS = {**PROTOCOL, "name": "asks", "blocks": [
+    {"name": "stairs", "task": "compare", "stimuli": ["ball"], "standard": "ball", "level": {"path": "/stiffness_n_per_m"},
+     "factors": ["size"],
+     "procedure": {"kind": "ask", "min": 310, "max": 600, "scale": "log", "stop": {"trials": 16}}}],
+    "groups": {"names": ["young", "old"]},
+    "factors": [{"name": "size", "levels": [{"name": "large", "set": {}}, {"name": "small", "set": {"/stimuli/*/radius_m": 0.02}}]}]}
+# In the form of AEPsych's client 0.5, without a server.
+STUB = """
+import json
+
+class AEPsychClient:
+    def __init__(self, ip, port):
+        self.calls, self.asked = open("calls.jsonl", "a", buffering=1), {}
+    def note(self, **call):
+        self.calls.write(json.dumps(call) + chr(10))
+    def configure(self, config_str, config_name):
+        self.note(configure=config_str, name=config_name)
+    def resume(self, config_name):
+        self.name = config_name
+    def ask(self):
+        self.asked[self.name] = self.asked.get(self.name, 0) + 1
+        return {"config": {"level": [2.5 + self.asked[self.name] / 100]}, "is_finished": False, "num_points": 1}
+    def tell(self, config, outcome):
+        self.note(tell=config, outcome=outcome, name=self.name)
+"""
+
+
+class AskProcedure(Asking):
+    def setUp(self):
+        super().setUp()
+        self.protocol = self.file("asks.json", ASKS)
+
+    def test_every_level_is_the_programs(self):
+        program, db = self.asked(lambda message: level(message, 400 + message["trial"] / 8))
+        asked = program.of("ask")
+        self.assertEqual(len(asked), 32)
+        self.assertEqual(self.levels(db), [400 + message["trial"] / 8 for message in asked])
+        self.assertEqual({(m["least"], m["most"], m["scale"], m["stimulus"]) for m in asked}, {(310, 600, "log", "ball")})
+        self.assertEqual(sorted(m["factors"]["size"] for m in asked), ["large"] * 16 + ["small"] * 16)
+        self.assertEqual(program.of("begin")[0]["group"], "young")
+        for told, row in zip(program.of("tell"), self.exported(db)[1], strict=True):
+            self.assertEqual((told["response"], told["response_time_s"]), (row["response"], float(row["response_time"])))
+        found = self.palpate("analyze", "--db", db, "--json", self.dir / "found.json").stdout
+        self.assertIn("JND", found)
+
+    def test_without_a_program_levels_cover_the_range(self):
+        db = self.dir / "alone.db"
+        self.assertIn("without --ask", self.simulate(db).stderr)
+        rows = self.exported(db)[1]
+        for size in ("large", "small"):
+            places = sorted(math.log(float(row["level"]) / 310) / math.log(600 / 310) for row in rows if row["size"] == size)
+            self.assertEqual(len(places), 16)
+            gaps = [b - a for a, b in zip(places, places[1:])]
+            self.assertLess(max(gaps) - min(gaps), 1e-9)  # sixteen points of van der Corput's sequence
+
+    def test_a_person_needs_a_program(self):
+        db = self.dir / "person.db"
+        for command in (("run", self.protocol, "--db", db, "--participant", "P1", "--device", "mouse"),
+                        ("serve", "--protocol", self.protocol, "--db", db, "--participant", "P1", "--device", "simulated")):
+            self.assertIn("asks a program for its levels", self.palpate(*command, status=2).stderr)
+        self.assertFalse(db.exists())
+
+    def test_aepsych_chooses_on_the_scale(self):
+        (self.dir / "aepsych_client.py").write_text(STUB)
+        path = self.dir / "socket"
+        example = pathlib.Path(EXAMPLE).parent / "aepsych_levels.py"
+        program = subprocess.Popen([sys.executable, example, path, "--first", "5"], cwd=self.dir,
+                                   env={**os.environ, "PYTHONPATH": str(self.dir)})
+        self.addCleanup(program.wait)
+        self.addCleanup(program.kill)
+        while not path.is_socket():
+            time.sleep(0.02)
+        db = self.dir / "a.db"
+        self.simulate(db, "--ask", path, "--ask-time-out-s", 20)
+        self.assertEqual(self.events(db), [])
+        self.assertEqual(sorted(round(math.log10(one), 9) for one in self.levels(db)),
+                         sorted(round(2.5 + n / 100, 9) for n in range(1, 17) for _ in range(2)))
+        calls = [json.loads(line) for line in (self.dir / "calls.jsonl").read_text().splitlines()]
+        configured = [call for call in calls if "configure" in call]
+        self.assertEqual(len({call["name"] for call in configured}), 2)
+        self.assertIn("lower_bound = " + repr(math.log10(310)), configured[0]["configure"])
+        told = [call for call in calls if "tell" in call]
+        rows = self.exported(db)[1]
+        self.assertEqual([call["outcome"] for call in told], [int(row["success"]) for row in rows])
+        for call, row in zip(told, rows, strict=True):
+            self.assertAlmostEqual(call["tell"]["level"][0], math.log10(float(row["level"])))
 
 
 if __name__ == "__main__":
