@@ -109,6 +109,7 @@ StoredProtocol read_stored_protocol(const std::string& text) {
   for (const auto& page : list_of(json, "pages")) read_columns(page, out.columns);
   out.groups = read_groups(json);
   read_factors(json, out.factors);
+  read_texts(json, "tests", out.tests);
   std::vector<std::string> renderers;
   read_texts(json, "renderers", renderers);
   for (const auto& one : list_of(json, "blocks")) {

@@ -40,6 +40,7 @@ struct StoredProtocol {
   std::vector<StoredColumn> columns;     ///< of participants
   GroupAssignment groups;                ///< of participants
   std::vector<StoredFactor> factors;     ///< empty: none
+  std::vector<std::string> tests;        ///< effects to adjust p values over; empty: all
 };
 
 StoredProtocol read_stored_protocol(const std::string& text);

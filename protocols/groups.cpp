@@ -18,7 +18,7 @@ using Rule = GroupAssignment::Rule;
 constexpr std::size_t kLongestName = 32;  // bytes
 constexpr NumberRange kBlock{1, 100};     // participants of each group
 /// A patch of these would make another study of it.
-constexpr std::array kUntouched = {"groups", "factors", "name", "version", "seed", "cues"};
+constexpr std::array kUntouched = {"groups", "factors", "tests", "name", "version", "seed", "cues"};
 
 bool is_group_name(const std::string& text) {
   std::string lower = text;

@@ -19,6 +19,7 @@
 #include "protocols/protocol.h"
 #include "protocols/schedule.h"
 #include "protocols/tasks/parse_blocks.h"
+#include "protocols/tested_effects.h"
 
 namespace palpate::protocols {
 namespace {
@@ -380,6 +381,7 @@ Protocol read_design(const json& root, const MeshFiles& files, FaultList& faults
   if (protocol.version == 2) {
     read_tasks(reader, protocol, files);
     patches = read_groups(reader, protocol);
+    read_tested_effects(reader, protocol);
   } else {
     read_identification(reader, protocol);
   }
@@ -415,6 +417,7 @@ void add_group_protocols(const json& root, const std::vector<json>& patches, con
     json patched = root;
     patched.merge_patch(patches[i]);
     patched.erase("groups");
+    patched.erase("tests");  // of the whole study
     FaultList own(faults.file());
     std::vector<json> none;
     auto group = std::make_shared<Protocol>();

@@ -336,6 +336,7 @@ struct Protocol {
   std::vector<std::string> stimulus_texts;  ///< JSON of each stimulus, for its levels
   std::vector<Factor> factors;              ///< crossed by blocks; each cell has its own stimuli
   GroupAssignment groups;                   ///< of participants
+  std::vector<std::string> tests;           ///< effects of the confirmatory family; empty: all
   /// The protocol of each group, with what differs for it (groups.h). Empty: there are no groups,
   /// or this is a group's own.
   std::vector<std::shared_ptr<const Protocol>> group_protocols;

@@ -559,6 +559,7 @@ void put_protocols(const std::vector<ProtocolText>& protocols, const std::string
     if (used && table.title.empty()) table.title = stored.title;
     for (const std::string& name : stored.groups.names) note_once(name, groups);
     note_factors(stored.factors, table);
+    for (const std::string& effect : stored.tests) note_once(effect, table.tests);
   }
   label_groups(groups, table);
   note_factors_of_trials(table);

@@ -43,6 +43,7 @@ struct StudyTable {
   std::vector<std::string> warnings;
   GroupLabels group_labels;
   std::vector<StudyFactor> factors;  ///< crossed; a trial's cell is in the name of its stimulus
+  std::vector<std::string> tests;    ///< effects that the protocols name; empty: all
   /// Answers that describe the participants of these trials; from databases only.
   std::vector<data::ParticipantColumn> people;
   /// Their protocols: name and SHA-256, each once.

@@ -27,6 +27,7 @@ GroupJson group_effect_json(const GroupEffect& effect) {
                 {"den_df", number_json(effect.den_df)},
                 {"f", number_json(effect.f)},
                 {"p", number_json(effect.p)},
+                {"p_holm", number_json(effect.p_holm)},
                 {"generalized_eta_squared", number_json(effect.generalized_eta_squared)}};
   if (effect.gg_epsilon) {
     out["gg_epsilon"] = *effect.gg_epsilon;
@@ -226,6 +227,7 @@ std::string f_test_text(const GroupEffect& effect) {
   if (effect.gg_p)
     text += " (Greenhouse-Geisser " + p_phrase(*effect.gg_p) + ", epsilon " +
             fixed(*effect.gg_epsilon, 2) + ")";
+  if (effect.p_holm) text += ", adjusted " + p_phrase(*effect.p_holm);
   if (effect.generalized_eta_squared)
     text += ", generalised eta squared " + fixed(*effect.generalized_eta_squared, 3);
   return text;
@@ -276,16 +278,19 @@ Table group_effects_table(const GroupedMeasure& of, const std::string& label) {
       title_of(of) + (of.groups.empty() ? ": analysis of variance of repeated measures"
                                         : ": mixed analysis of variance"),
       label);
-  out.header = {"Effect", "df", "F", "p", "p (Greenhouse-Geisser)", "Generalised eta squared"};
+  out.header = {
+      "Effect", "df", "F", "p", "p (Greenhouse-Geisser)", "p (Holm)", "Generalised eta squared"};
   for (const GroupEffect& one : of.result.anova.effects) {
     out.rows.push_back(
         {one.name,
          one.num_df ? short_number(*one.num_df) + ", " + short_number(*one.den_df) : kMissing,
-         number(one.f, 2), p_or_missing(one.p), p_or_missing(one.gg_p),
+         number(one.f, 2), p_or_missing(one.p), p_or_missing(one.gg_p), p_or_missing(one.p_holm),
          number(one.generalized_eta_squared, 3)});
     if (!one.undefined.empty()) out.notes.push_back(one.name + ": " + one.undefined + ".");
   }
   if (!of.result.anova.undefined.empty()) out.notes.push_back(of.result.anova.undefined + ".");
+  out.notes.emplace_back(
+      "Holm: over these effects, or over those that the protocol names as tests.");
   if (!of.groups.empty())
     out.notes.emplace_back("Type III: every group counts equally, whatever its size.");
   return out;
@@ -431,7 +436,8 @@ std::vector<Table> design_tables(const std::vector<GroupedMeasure>& measures,
   return out;
 }
 
-std::string design_conclusion(const std::vector<GroupedMeasure>& measures) {
+std::string design_conclusion(const std::vector<GroupedMeasure>& measures,
+                              const std::vector<std::string>& tests) {
   struct Candidate {
     const GroupedMeasure* measure;
     const GroupEffect* effect;
@@ -442,8 +448,9 @@ std::string design_conclusion(const std::vector<GroupedMeasure>& measures) {
     for (const GroupEffect& effect : one.result.anova.effects) {
       // Without factors, those within participants are told of by themselves.
       if (!one.crossed && !effect.name.starts_with("group")) continue;
+      if (!is_tested(tests, effect.name)) continue;
       candidates.push_back({&one, &effect});
-      p.push_back(effect.gg_p ? effect.gg_p : effect.p);
+      p.push_back(effect.p_value());
     }
   }
   if (candidates.empty()) return "";
@@ -456,13 +463,13 @@ std::string design_conclusion(const std::vector<GroupedMeasure>& measures) {
   if (!adjusted[best])
     return crossed ? "The cells of the design cannot be compared."
                    : "The groups cannot be compared.";
-  const std::string tests = std::to_string(candidates.size());
+  const std::string count = std::to_string(candidates.size());
   if (*adjusted[best] >= kAlpha)
     return std::string(crossed ? "No effect of the design is clear ("
                                : "No effect of the group is clear (") +
-           tests + " effects; the least " + p_phrase(*adjusted[best]) + ", Holm).";
+           count + " effects; the least " + p_phrase(*adjusted[best]) + ", Holm).";
   return finding_of(title_of(*candidates[best].measure), candidates[best].effect->name) + " (" +
-         p_phrase(*adjusted[best]) + " adjusted over " + tests + " effects, Holm).";
+         p_phrase(*adjusted[best]) + " adjusted over " + count + " effects, Holm).";
 }
 
 }  // namespace palpate::analysis

@@ -22,7 +22,8 @@ std::vector<Table> design_tables(const std::vector<GroupedMeasure>& measures,
                                  const std::string& label);
 
 /// The finding for a headline: the clearest effect, Holm-adjusted over all effects of the factors
-/// and of the group; "": there are neither.
-std::string design_conclusion(const std::vector<GroupedMeasure>& measures);
+/// and of the group, or over those named; "": there are neither. \param tests  empty: all
+std::string design_conclusion(const std::vector<GroupedMeasure>& measures,
+                              const std::vector<std::string>& tests);
 
 }  // namespace palpate::analysis

@@ -620,7 +620,7 @@ bool has_model(const StudyAnalysis& analysis, const TaskComparison& one) {
 }
 
 std::string headline(const StudyAnalysis& analysis) {
-  const std::string groups = design_conclusion(analysis.by_design);
+  const std::string groups = design_conclusion(analysis.by_design, analysis.table.tests);
   return groups.empty() ? conclusion(analysis) : groups + " " + conclusion(analysis);
 }
 

@@ -31,6 +31,11 @@ struct GroupEffect {
   std::optional<double> gg_epsilon, gg_p;
   /// SS / (SS + all error SS); Olejnik & Algina (2003), both factors taken as manipulated.
   std::optional<double> generalized_eta_squared;
+  /// Over the family of effects of one measure (Holm); none: not in it.
+  std::optional<double> p_holm;
+
+  /// Corrected for sphericity where there is something to correct.
+  const std::optional<double>& p_value() const { return gg_p ? gg_p : p; }
 };
 
 struct MixedAnova {

@@ -38,10 +38,20 @@ std::optional<std::size_t> known_group(const GroupLabels& labels, const std::str
   return known == labels.of.end() ? std::nullopt : std::optional(known->second);
 }
 
-void compare_measure(GroupedMeasure& measure) {
+/// Adjusts the p of the effects that the study is about. \param tests  empty: all
+void adjust_effects(const std::vector<std::string>& tests, std::vector<GroupEffect>& effects) {
+  std::vector<std::optional<double>> p;
+  for (const GroupEffect& effect : effects)
+    p.push_back(is_tested(tests, effect.name) ? effect.p_value() : std::nullopt);
+  const auto adjusted = holm(p);
+  for (std::size_t i = 0; i < effects.size(); ++i) effects[i].p_holm = adjusted[i];
+}
+
+void compare_measure(const std::vector<std::string>& tests, GroupedMeasure& measure) {
   measure.result = compare_groups(
       measure.figures, std::max<std::size_t>(1, measure.groups.size()), sizes_of(measure.within),
       measure.crossed ? WithinContrasts::added : WithinContrasts::left_out);
+  adjust_effects(tests, measure.result.anova.effects);
 }
 
 /// The factors that these stimuli cross completely, and what they cross: the index of each cell's
@@ -118,7 +128,7 @@ GroupedMeasure identification_by_design(const Analysis& analysis, const StudyTab
     }
     out.figures.push_back(std::move(one));
   }
-  compare_measure(out);
+  compare_measure(table.tests, out);
   return out;
 }
 
@@ -185,7 +195,7 @@ std::optional<GroupedMeasure> task_by_design(const MeasureOfTask& task, const St
       }
     }
   }
-  compare_measure(out);
+  compare_measure(table.tests, out);
   return out;
 }
 
@@ -211,6 +221,10 @@ std::vector<MeasureOfTask> measures_of_tasks(const std::vector<TaskGroup>& group
 }
 
 }  // namespace
+
+bool is_tested(const std::vector<std::string>& tests, const std::string& effect) {
+  return tests.empty() || std::ranges::find(tests, effect) != tests.end();
+}
 
 std::vector<GroupedMeasure> measures_by_design(const StudyAnalysis& analysis) {
   std::vector<GroupedMeasure> out;

@@ -32,6 +32,9 @@ struct GroupedMeasure {
   std::optional<GroupedMixedModel> model;
 };
 
+/// Whether an effect belongs to the family that the protocols name. \param tests  empty: all do
+bool is_tested(const std::vector<std::string>& tests, const std::string& effect);
+
 /// Empty: the study has neither groups nor factors.
 std::vector<GroupedMeasure> measures_by_design(const StudyAnalysis& analysis);
 

@@ -116,7 +116,8 @@ class TaskAnswers final : public StudyAnswers {
           "participants.";
     if (!protocol_.factors.empty())
       out +=
-          " effects.MEASURE.BLOCK.EFFECT has f, num_df, den_df, p and generalized_eta_squared of "
+          " effects.MEASURE.BLOCK.EFFECT has f, num_df, den_df, p, p_holm and "
+          "generalized_eta_squared of "
           "an effect such as " +
           example_of_effect() + ".";
     if (compares_blocks())
@@ -380,7 +381,9 @@ class TaskAnswers final : public StudyAnswers {
     std::string family = "p values are adjusted by Holm's method over the comparisons of a measure";
     if (kinds_.rate) family += " (of ratings, over all of a block)";
     if (!protocol_.factors.empty() || protocol_.groups.any())
-      family += "; those of effects of an analysis of variance are not";
+      family += "; those of effects of an analysis of variance (p_holm) over " +
+                (protocol_.tests.empty() ? std::string("all effects of a measure")
+                                         : joined(protocol_.tests) + " of a measure");
     return {text("Two-sided tests with alpha = " + plain(made_.alpha) + ". " + family +
                  ". Hypotheses are judged by their conditions (question 2); there is no adjustment "
                  "over hypotheses.")};

@@ -198,6 +198,22 @@ TEST(Factors, AnswersAreOfPlainStimuli) {
   EXPECT_EQ(block.stimuli.size(), 4U);
 }
 
+TEST(Factors, TestsNameEffectsInOrder) {
+  json study = crossed_study("constant");
+  study["tests"] = {"surface", "size", "renderer:surface:size"};
+  EXPECT_EQ(parsed(study).tests.size(), 3U);
+  study["tests"] = {"size:surface", "group", "surface", "surface", "surface:surface", "lag", 3, ""};
+  EXPECT_EQ(faults_of(study),
+            (std::vector<std::string>{"/tests/0", "/tests/1", "/tests/3", "/tests/4", "/tests/5",
+                                      "/tests/6", "/tests/7"}));
+  json plain = task_study();
+  plain["tests"] = {"renderer"};
+  EXPECT_EQ(faults_of(plain), std::vector<std::string>{"/tests"});
+  plain["groups"] = {{"names", {"a", "b"}}};
+  plain["tests"] = {"group", "group:renderer"};
+  EXPECT_EQ(parsed(plain).tests.size(), 2U);
+}
+
 TEST(Factors, FaultsNameTheirPlace) {
   const auto with = [](const std::function<void(json&)>& change, const char* mixing = "mixed") {
     json study = crossed_study("constant", mixing);

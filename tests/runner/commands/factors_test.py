@@ -80,6 +80,19 @@ class Factors(command_case.CommandCase):
             self.assertAlmostEqual(effects[name]["f"] / f_of(sign), 1, places=9)
             self.assertEqual((effects[name]["num_df"], effects[name]["den_df"]), (1, 6))
 
+        def holm(names):
+            adjusted, least = {}, 0
+            for i, name in enumerate(sorted(names, key=lambda one: effects[one]["p"])):
+                least = max(least, min(1, (len(names) - i) * effects[name]["p"]))
+                adjusted[name] = least
+            return adjusted
+
+        self.assertEqual({name: one["p_holm"] for name, one in effects.items()}, holm(effects))
+        named = ["size", "surface:size"]
+        found = self.analyzed("--db", self.simulated({**SMALL, "tests": named}, "--participants", 7, name="named.db"))
+        self.assertEqual({name: one["p_holm"] for name, one in found["effects"]["exponent"]["a"].items()},
+                         {**holm(named), "surface": None})
+
     def test_a_factor_equals_two_blocks(self):
         block = {"name": "a", "task": "compare", "stimuli": ["plate"], "standard": "plate", "factors": ["surface"], **LEVEL,
                  "procedure": {"kind": "constant", "levels": [200, 250, 350, 400], "repetitions": 8}}
