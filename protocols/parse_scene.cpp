@@ -12,6 +12,7 @@
 #include "data/base/text.h"
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
+#include "protocols/parse_effects.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/shapes.h"
@@ -236,6 +237,7 @@ bool can_be_soft(const stimuli::ObjectSpec& spec) {
     case stimuli::ShapeKind::mesh:
       return stimuli::is_gmsh_file_name(spec.file);
     case stimuli::ShapeKind::cone:
+    case stimuli::ShapeKind::none:
     case stimuli::ShapeKind::compound:
       return false;
   }
@@ -391,6 +393,9 @@ void read_parts(ObjectReader& reader, const MeshFiles& files, int compounds,
       part.faults().add(part.pointer("soft"), "expected at an object, not at a part of a compound");
     if (part.member("body") != nullptr)
       part.faults().add(part.pointer("body"), "expected at the object: its parts move as one");
+    refuse_effects_of_part(part);
+    if (spec.parts.back().shape == stimuli::ShapeKind::none)
+      part.faults().add(part.pointer("shape"), "expected a shape: fields alone are an object");
     part.refuse_unknown_keys();
   }
 }
@@ -431,7 +436,8 @@ stimuli::ObjectSpec read_nested(ObjectReader& reader, const stimuli::Material& d
   }
   if (spec.shape == stimuli::ShapeKind::compound) {
     read_parts(reader, files, compounds, spec);
-  } else if (spec.material.stiffness == 0 && spec.material.layers.empty()) {
+  } else if (spec.material.stiffness == 0 && spec.material.layers.empty() &&
+             spec.shape != stimuli::ShapeKind::none) {
     reader.faults().add(reader.pointer("layers"),
                         "expected layers under a surface of stiffness 0: there is nothing to feel");
   }
@@ -517,6 +523,7 @@ stimuli::ObjectSpec read_object(ObjectReader& reader, const stimuli::Material& d
   stimuli::ObjectSpec spec = read_nested(reader, default_material, files, 0);
   read_body(reader, spec.body);
   read_soft(reader, spec);
+  read_effects(reader, files, spec);
   return spec;
 }
 

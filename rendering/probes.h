@@ -158,6 +158,22 @@ inline Portion portion_from_edge(const stimuli::ConvexMesh& mesh, const WalkResu
   return portion;
 }
 
+/// m, the part of the segment over which a textured face is felt: that of the uniform pressure
+/// about the point of equation (2). It begins at the deeper end of the portion over the face.
+inline Vec3 pressed_window(const stimuli::ConvexMesh& mesh, const WalkResult& hit, const Vec3& tip,
+                           const Vec3& d, double probe_fraction) {
+  std::uint32_t facet = hit.feature.index;
+  if (hit.feature.kind == ContactFeature::Kind::edge) {
+    const stimuli::Edge& edge = mesh.edges()[hit.feature.index];
+    const double left = glm::dot(mesh.facets()[edge.left].normal, d);
+    const double right = glm::dot(mesh.facets()[edge.right].normal, d);
+    facet = std::abs(left) <= std::abs(right) ? edge.left : edge.right;
+  }
+  const Portion portion = touching_portion(mesh, facet, tip + hit.depth * hit.normal, d);
+  const double share = 2 * std::min(probe_fraction - portion.enter, portion.leave - probe_fraction);
+  return std::max(0.0, share) * (d - glm::dot(d, hit.normal) * hit.normal);
+}
+
 /// The whole segment.
 struct SegmentProbe {
   static constexpr bool kSegment = true;

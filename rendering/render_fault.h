@@ -27,9 +27,10 @@ inline constexpr std::uint32_t kContactCapped = 4096;
 inline constexpr std::uint32_t kReleased = 8192;
 inline constexpr std::uint32_t kSoftLate = 16384;
 inline constexpr std::uint32_t kSoftStalled = 32768;
+inline constexpr std::uint32_t kTextureLost = 65536;
 }  // namespace render_fault
 
-inline constexpr std::array<FaultBit, 8> kRenderFaults = {{
+inline constexpr std::array<FaultBit, 9> kRenderFaults = {{
     {render_fault::kNonFinite, "non-finite", "not a finite number",
      "the pose or the force was not a finite number: zero force until cleared",
      "a force or pose was not finite"},
@@ -53,6 +54,9 @@ inline constexpr std::array<FaultBit, 8> kRenderFaults = {{
     {render_fault::kSoftStalled, "soft-stalled", "soft body stalled",
      "no step of a soft object for a tenth of a second: zero force until cleared",
      "the steps of a soft object stopped"},
+    {render_fault::kTextureLost, "texture-lost", "texture cut short",
+     "the search for the contact's place on a texture reached its limit of steps: the contact "
+     "stayed where it was"},
 }};
 
 /// Every bit of the table.

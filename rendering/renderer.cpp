@@ -28,13 +28,21 @@ class ProbeRenderer final : public Renderer {
                                 dt);
   }
 
+  static Rendering render_effects(const Scene& scene, RenderState& state, const LineProbe& probe,
+                                  double dt) noexcept {
+    Rendering felt = kTicks[scene.features_index() - Scene::kWithEffects](scene, state, probe, dt);
+    add_effects(scene, state, probe, dt, Probe::kSegment, felt);
+    return felt;
+  }
+
   using TickFunction = Rendering (*)(const Scene&, RenderState&, const LineProbe&, double) noexcept;
   static constexpr auto kTicks = []<std::size_t... i>(std::index_sequence<i...>) {
-    return std::array<TickFunction, 2 * TickFeatures::kCount>{
-        (i < TickFeatures::kCount ? &tick::render_tick<Probe, TickFeatures::of(i)>
-                                  : &render_motion)...};
+    return std::array<TickFunction, 2 * Scene::kWithEffects>{
+        (i >= Scene::kWithEffects    ? &render_effects
+         : i >= TickFeatures::kCount ? &render_motion
+                                     : &tick::render_tick<Probe, TickFeatures::of(i)>)...};
   }
-  (std::make_index_sequence<2 * TickFeatures::kCount>());
+  (std::make_index_sequence<2 * Scene::kWithEffects>());
 };
 
 }  // namespace

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "stimuli/convex_mesh.h"
+#include "stimuli/texture.h"
 
 namespace palpate::rendering {
 namespace {
@@ -78,6 +79,7 @@ Scene::Scene(std::vector<SceneObject> objects, bool side_contact, Tool tool,
     part.material = object.material;
     features.damping |= part.material.damping != 0;
     features.friction |= part.material.has_friction();
+    features.texture |= part.material.texture != nullptr;
     part.shallow_ridges = side_contact && part.trees->shallow_ridges();
     part.object = object.object;
     part.solid = object.own_solid();
@@ -151,7 +153,19 @@ void Scene::set_feel(std::uint32_t part, const Feel& feel) noexcept {
   TickFeatures features = TickFeatures::of(features_index_);
   features.damping |= material.damping != 0;
   features.friction |= material.has_friction();
-  features_index_ = features.index();
+  features_index_ = features.index() + (effects_ ? kWithEffects : 0);
+}
+
+void Scene::set_effects(SceneEffects effects) {
+  std::erase_if(effects.objects, [](const ObjectEffects& object) {
+    const bool knocks = object.transient && object.transient->amplitude > 0;
+    return object.fields.empty() && !knocks;
+  });
+  features_index_ %= kWithEffects;
+  effects_ = nullptr;
+  if (effects.objects.empty()) return;
+  effects_ = std::make_shared<const SceneEffects>(std::move(effects));
+  features_index_ += kWithEffects;
 }
 
 bool Scene::differs_in_feel_only(const Scene& other) const {
@@ -159,20 +173,26 @@ bool Scene::differs_in_feel_only(const Scene& other) const {
     return a.to_world == b.to_world && a.position == b.position && a.object == b.object &&
            a.group == b.group;
   };
+  const auto same_texture = [](const stimuli::Material& a, const stimuli::Material& b) {
+    return a.texture == b.texture ||
+           (a.texture != nullptr && b.texture != nullptr && a.texture->same_as(*b.texture));
+  };
   const auto same_part = [&](const ScenePart& a, const ScenePart& b) {
-    return same_place(a, b) && a.layer == b.layer && a.break_force == b.break_force &&
-           a.breaking == b.breaking && std::ranges::equal(a.mesh->vertices(), b.mesh->vertices());
+    return same_place(a, b) && same_texture(a.material, b.material) && a.layer == b.layer &&
+           a.break_force == b.break_force && a.breaking == b.breaking &&
+           std::ranges::equal(a.mesh->vertices(), b.mesh->vertices());
   };
   const auto same_surface = [&](const PlacedSurface& a, const PlacedSurface& b) {
     return same_place(a, b) && a.first_material == b.first_material &&
            std::ranges::equal(a.surface->vertices(), b.surface->vertices()) &&
            a.surface->triangles().size() == b.surface->triangles().size();
   };
-  return motion_ == nullptr && other.motion_ == nullptr &&
-         features().unions == other.features().unions && groups_.size() == other.groups_.size() &&
-         materials() == other.materials() && segments() == other.segments() &&
-         std::ranges::equal(parts_, other.parts_, same_part) &&
-         std::ranges::equal(surfaces_, other.surfaces_, same_surface);
+  return motion_ == nullptr && other.motion_ == nullptr && effects_ == nullptr &&
+         other.effects_ == nullptr && features().unions == other.features().unions &&
+         groups_.size() == other.groups_.size() && materials() == other.materials() &&
+         segments() == other.segments() && std::ranges::equal(parts_, other.parts_, same_part) &&
+         std::ranges::equal(surfaces_, other.surfaces_, same_surface) &&
+         std::ranges::equal(materials_, other.materials_, same_texture);
 }
 
 void Scene::add_surfaces(std::vector<SceneSurface> surfaces, TickFeatures& features) {
@@ -202,6 +222,7 @@ void Scene::add_surfaces(std::vector<SceneSurface> surfaces, TickFeatures& featu
     for (const stimuli::Material& material : surface.surface->materials()) {
       features.damping |= material.damping != 0;
       features.friction |= material.has_friction();
+      features.texture |= material.texture != nullptr;
       materials_.push_back(material);
     }
     PartGroup group;
@@ -285,6 +306,13 @@ RenderState Scene::initial_state() const {
   if (!part_tree_.nodes().empty()) state.nearby.parts.reserve(parts_.size());
   if (!features().several_parts) state.near_parts.push_back(0);  // a single part is always near
   state.contacts.reserve(parts_.size());
+  if (features().texture) state.textures.resize(parts_.size());
+  if (effects_) {
+    std::size_t fields = 0;
+    for (const ObjectEffects& object : effects_->objects) fields += object.fields.size();
+    state.effects.velocities.resize(fields);
+    state.effects.knocks.resize(effects_->objects.size());
+  }
   if (motion_) state.motion = OwnedMotion(motion_->initial_state());
   if (features().unions) {
     std::size_t most_pairs = 0, contacts = 0;
@@ -301,6 +329,7 @@ RenderState Scene::initial_state() const {
     state.unions.near.reserve(most_pairs);
     state.unions.contacts.reserve(contacts);
     state.unions.rubbed.reserve(contacts);
+    if (features().texture) state.unions.carved.resize(groups_.size());
   }
   return state;
 }

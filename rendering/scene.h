@@ -11,9 +11,11 @@
 
 #include "rendering/contact.h"
 #include "rendering/facet_walk.h"
+#include "rendering/fields.h"
 #include "rendering/first_contact.h"
 #include "rendering/probe.h"
 #include "rendering/separation.h"
+#include "rendering/texture.h"
 #include "rendering/tool.h"
 #include "rendering/union_state.h"
 #include "stimuli/convex_mesh.h"
@@ -104,14 +106,16 @@ struct TickFeatures {
   bool friction = false;
   /// Objects of several parts, layers, or a tool: the law of union_contact.h; or closed surfaces.
   bool unions = false;
+  bool texture = false;  ///< some surface is carved (texture.h)
 
-  static constexpr std::size_t kCount = 16;  ///< combinations
+  static constexpr std::size_t kCount = 32;  ///< combinations
   static constexpr TickFeatures of(std::size_t index) {
-    return {(index & 1) != 0, (index & 2) != 0, (index & 4) != 0, (index & 8) != 0};
+    return {(index & 1) != 0, (index & 2) != 0, (index & 4) != 0, (index & 8) != 0,
+            (index & 16) != 0};
   }
   constexpr std::size_t index() const {
     return std::size_t{several_parts} | std::size_t{damping} << 1 | std::size_t{friction} << 2 |
-           std::size_t{unions} << 3;
+           std::size_t{unions} << 3 | std::size_t{texture} << 4;
   }
   constexpr bool plain_springs() const { return !damping && !friction; }
 };
@@ -148,7 +152,9 @@ struct RenderState {
   Vec3 measured_side;
   UnionMemory unions;                   ///< empty where the scene has none
   std::vector<LoadedContact> contacts;  ///< of the last tick; with room for one of each part
+  std::vector<TextureState> textures;   ///< of each part; empty where nothing is textured
   OwnedMotion motion;                   ///< empty where nothing moves
+  EffectsState effects;                 ///< empty where the scene has none
 };
 
 /// What of a material may change while it is touched: not the depths and strengths of layers.
@@ -183,11 +189,17 @@ class Scene {
   /// In a scene without motion(). By the thread that renders it, between two ticks.
   void set_feel(std::uint32_t part, const Feel& feel) noexcept;
   /// Whether a tick of the other scene may continue a state of this one: nothing moves, and shapes,
-  /// poses, layers and tool are equal. Reads no material.
+  /// poses, layers, textures and tool are equal. Reads no number that set_feel writes.
   bool differs_in_feel_only(const Scene& other) const;
+  /// Fields and knocks, before the first state is made; without any, nothing changes.
+  void set_effects(SceneEffects effects);
+  /// Null: none.
+  const SceneEffects* effects() const { return effects_.get(); }
   const SceneMotion* motion() const { return motion_.get(); }
-  /// Selects the tick that a renderer runs; from TickFeatures::kCount on, that of motion().
   TickFeatures features() const { return TickFeatures::of(features_index_); }
+  /// Selects the tick that a renderer runs; from TickFeatures::kCount on, that of motion(); from
+  /// kWithEffects on, the same with effects().
+  static constexpr std::size_t kWithEffects = 2 * TickFeatures::kCount;
   std::size_t features_index() const { return features_index_; }
   /// Parts of one group are contiguous.
   const std::vector<PartGroup>& groups() const { return groups_; }
@@ -229,6 +241,7 @@ class Scene {
   std::size_t features_index_ = 0;
   bool is_one_surface_ = false;
   std::shared_ptr<const SceneMotion> motion_;
+  std::shared_ptr<const SceneEffects> effects_;
   BoundingTree part_tree_;
   std::vector<Sphere> node_spheres_;
   double mean_radius_ = 0;

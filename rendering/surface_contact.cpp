@@ -104,27 +104,29 @@ class Lying {
 
 /// Where the segment touches: equation (2) over the triangles that it lies along.
 /// \param at  of the patch's own contact point on the segment
+/// \param pressed  share of the segment about that point that lies on the surface (texture.h)
 double place_on(const Surface& surface, const SurfacePatch& patch, const Vec3& tip, const Vec3& d,
-                double at, ContactType& type) {
+                double at, ContactType& type, double& pressed) {
   const Lying lying(surface, tip, d);
   const std::uint32_t left = patch.triangle();
   int along = 0;
-  double place = at;
+  double forwards = 0, back = 0;
   if (patch.kind == PatchKind::edge) {
     const std::uint32_t right = SurfaceTriangle::triangle_of(
         surface.triangles()[left].across[SurfaceTriangle::side_of(patch.side)]);
     // The triangle ahead slopes down along the segment.
     const bool left_ahead = by_tip(surface.triangles()[left], d);
     const std::uint32_t ahead = left_ahead ? left : right, behind = left_ahead ? right : left;
-    place += lying.way(ahead, at, true, along);
-    place += lying.way(behind, at, false, along);
+    forwards = lying.way(ahead, at, true, along);
+    back = lying.way(behind, at, false, along);
   } else {
-    place += lying.way(left, at, true, along);
-    place += lying.way(left, at, false, along);
+    forwards = lying.way(left, at, true, along);
+    back = lying.way(left, at, false, along);
   }
   if (along == 0) return at;
   type = ContactType::segment_face;
-  return std::clamp(place, 0.0, 1.0);
+  pressed = 2 * (forwards - back);
+  return std::clamp(at + forwards + back, 0.0, 1.0);
 }
 
 }  // namespace
@@ -390,13 +392,21 @@ void SurfaceTool::add_contact(const SurfacePlane& plane, const Vec3& shift) {
       const std::uint32_t k = SurfaceTriangle::side_of(patch.side);
       const Vec3& v0 = surface_.vertices()[triangle.corners[k]];
       const Vec3 e = surface_.vertices()[triangle.corners[(k + 1) % 3]] - v0;
+      if (tick_.scene.material_of(c.part).texture != nullptr) {
+        out.edge = placed_.world_vector(e);
+        out.along = placed_.world_vector(segment.along);
+      }
       const Vec3 normal = glm::cross(e, segment.along);
       const double size2 = glm::dot(normal, normal);
       c.probe_fraction =
           size2 > 0 ? std::clamp(glm::dot(glm::cross(tip - v0, e), normal) / size2, 0.0, 1.0) : 0.5;
     }
+    double pressed = 0;
     c.probe_fraction =
-        place_on(surface_, patch, tip, segment.along, c.probe_fraction, c.contact.type);
+        place_on(surface_, patch, tip, segment.along, c.probe_fraction, c.contact.type, pressed);
+    if (tick_.scene.material_of(c.part).texture != nullptr)
+      out.window = placed_.world_vector(
+          pressed * (segment.along - glm::dot(segment.along, plane.normal) * plane.normal));
   }
   out.shift = placed_.world_vector(shift);
   const PlacedSegment ideal = place_segment(carried_, tick_.sides, pose_, patch.segment);

@@ -17,6 +17,7 @@
 #include "rendering/renderer.h"
 #include "rendering/scene.h"
 #include "rendering/surface_contact.h"
+#include "rendering/texture.h"
 #include "rendering/union_contact.h"
 
 namespace palpate::rendering::tick {
@@ -155,6 +156,28 @@ struct SpreadPoint {
   return {c.probe_fraction, c.contact.type};
 }
 
+/// The contact on a textured part, whose smooth surface it touches. False: it is above the texture.
+template <class Probe>
+bool carve_contact(const ScenePart& part, const WalkResult& hit, const Vec3& tip, const Vec3& d,
+                   TextureState& state, LoadedContact& c, std::uint32_t& faults) {
+  SmoothContact smooth{hit.normal, hit.depth, tip + hit.depth * hit.normal + c.probe_fraction * d};
+  if constexpr (Probe::kSegment) {
+    if (hit.feature.kind == ContactFeature::Kind::edge) {
+      const stimuli::Edge& edge = part.mesh->edges()[hit.feature.index];
+      smooth.edge = edge.to - edge.from;
+      smooth.probe = d;
+    }
+    if (c.contact.type == ContactType::segment_face)
+      smooth.window = pressed_window(*part.mesh, hit, tip, d, c.probe_fraction);
+  }
+  const CarvedContact carved = carve(*part.material.texture, smooth, state);
+  if (carved.lost) faults |= render_fault::kTextureLost;
+  if (!carved.touches) return false;
+  c.contact.depth = glm::length(carved.shift);
+  c.contact.normal = part.world_vector(carved.shift / c.contact.depth);
+  return true;
+}
+
 /// One tick in progress: the contacts found so far.
 template <class ProbeKind>
 struct Tick {
@@ -169,6 +192,8 @@ struct Tick {
   const LineProbe* last() const { return state.has_last ? &state.last : nullptr; }
 
   /// Finds the contact with one part. True if there is one; then fills in `c`.
+  /// \tparam kTexture  the part may be textured
+  template <bool kTexture>
   [[gnu::always_inline]] bool contact_of(std::uint32_t index, LoadedContact& c) {
     const ScenePart& part = scene.parts()[index];
     PartState& memory = state.parts[index];
@@ -176,7 +201,10 @@ struct Tick {
     const Vec3 d = Probe::kSegment ? part.local_vector(probe.tail - probe.tip) : Vec3(0);
     const WalkResult hit = track<Probe>(part, memory, last(), tip, d, faults);
     if (memory.started_inside) faults |= render_fault::kStartedInside;
-    if (hit.feature.kind == ContactFeature::Kind::none) return false;
+    if (hit.feature.kind == ContactFeature::Kind::none) {
+      if constexpr (kTexture) state.textures[index].touching = false;
+      return false;
+    }
     c.part = index;
     Probe::classify(*part.mesh, hit, tip, d, length, c);
     if (Probe::kSegment && part.shallow_ridges) [[unlikely]] {
@@ -189,16 +217,21 @@ struct Tick {
     c.contact.depth = hit.depth;
     c.stiffness = part.material.stiffness;
     c.object = part.object;
+    if constexpr (kTexture) {
+      if (part.material.texture != nullptr)
+        return carve_contact<Probe>(part, hit, tip, d, state.textures[index], c, faults);
+    }
     return true;
   }
 
   /// Adds the contacts of all parts that are near.
+  template <bool kTexture>
   void add_contacts() {
     state.contacts.clear();
     for (const std::uint32_t index : state.near_parts) {
       LoadedContact found;
       // Scene::initial_state reserved room for one contact of each part: no allocation.
-      if (contact_of(index, found)) state.contacts.push_back(found);
+      if (contact_of<kTexture>(index, found)) state.contacts.push_back(found);
     }
   }
 
@@ -293,7 +326,7 @@ void add_placed_contacts(UnionTick& tick, Tick<Probe>& plain) {
       continue;
     }
     PlacedContact found;
-    if (!plain.contact_of(index, found.loaded)) continue;
+    if (!plain.template contact_of<kFeatures.texture>(index, found.loaded)) continue;
     found.group = group;
     load(std::span<LoadedContact, 1>(&found.loaded, 1));
     found.shift = found.loaded.normal_displacement * found.loaded.contact.normal;
@@ -346,6 +379,7 @@ Rendering render_unions(const Scene& scene, RenderState& state, const LineProbe&
   UnionTick tick{scene, state, tool, Probe::kSegment, dt};
   update_objects(tick);
   add_placed_contacts<Probe, kFeatures>(tick, plain);
+  if constexpr (kFeatures.texture) carve_placed_contacts(tick);
   const std::span<PlacedContact> contacts(all.contacts);
   if constexpr (!kFeatures.plain_springs())
     apply_material_forces<kFeatures>(scene, state, contacts, dt > 0 ? 1 / dt : 0);
@@ -364,7 +398,7 @@ Rendering render_tick(const Scene& scene, RenderState& state, const LineProbe& p
                       double dt) noexcept {
   if (!within_range(probe.tip) || !within_range(probe.tail))
     return no_contact(state.last, render_fault::kNonFinite);
-  if constexpr (kFeatures.unions && kFeatures.plain_springs()) {
+  if constexpr (kFeatures.unions && kFeatures.plain_springs() && !kFeatures.texture) {
     if (scene.is_one_surface()) return render_surface<Probe>(scene, state, probe, dt);
   }
   if constexpr (kFeatures.unions) return render_unions<Probe, kFeatures>(scene, state, probe, dt);
@@ -377,14 +411,14 @@ Rendering render_tick(const Scene& scene, RenderState& state, const LineProbe& p
   };
   if constexpr (kFeatures.several_parts) {
     update_near_parts<Probe::kSegment>(scene, state, probe);
-    tick.add_contacts();
+    tick.template add_contacts<kFeatures.texture>();
     const std::span<LoadedContact> contacts(state.contacts);
     load(contacts);
     finish(contacts);
     if (!contacts.empty()) return sum_contacts<Probe, kFeatures.friction>(tick, contacts);
   } else {
     LoadedContact contact;
-    if (tick.contact_of(0, contact)) {
+    if (tick.template contact_of<kFeatures.texture>(0, contact)) {
       const std::span<LoadedContact, 1> contacts(&contact, 1);
       load(contacts);
       finish(contacts);

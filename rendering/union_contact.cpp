@@ -187,6 +187,18 @@ void IdealTool::add_contact(const Plane& plane, const Vec3& shift) {
     out.motion = tick_.tool.tip - all_.last.tip + (now.from + c.probe_fraction * now.along) -
                  (last.from + c.probe_fraction * last.along);
   }
+  if (part.material.texture != nullptr) {
+    if (plane.feature.kind == Kind::edge && tick_.sides) {
+      const stimuli::Edge& edge = part.mesh->edges()[plane.feature.index];
+      out.edge = part.world_vector(edge.to - edge.from);
+      out.along = segment.along;
+    }
+    if (c.contact.type == ContactType::segment_face) {
+      at.depth = 0;  // of the ideal tool
+      out.window = part.world_vector(
+          tick::pressed_window(*part.mesh, at, tip, near.true_d, c.probe_fraction));
+    }
+  }
   out.group = index_;
   out.pair = near.pair;
   out.segment = static_cast<int>(near.segment);

@@ -343,6 +343,20 @@ struct PlacedContact {
   std::uint32_t pair = 0;  ///< by_law groups only
   int segment = 0;
   bool by_law = false;
+  // On textured objects, as of SmoothContact (texture.h). World frame, m.
+  Vec3 edge, along, window;
+};
+
+/// The places on textures that an ideal tool touched at the last tick.
+struct CarvedGroup {
+  struct Held {
+    Vec3 place;  ///< m, as of TextureState; world frame
+    int segment = 0;
+    bool taken = false;  ///< by a contact of this tick
+  };
+  std::array<Held, kMostPlanes> held;
+  std::size_t count = 0;
+  bool seen = false;  ///< in this tick
 };
 
 /// A pair that friction acted on.
@@ -360,6 +374,7 @@ struct UnionMemory {
   std::vector<NearPair> near;           ///< of the current group
   std::vector<PlacedContact> contacts;  ///< of the last tick
   std::vector<RubbedPair> rubbed;       ///< at the last tick
+  std::vector<CarvedGroup> carved;      ///< of each group; empty where nothing is textured
   PlacedTool now;                       ///< the virtual tool at this tick
   PlacedTool before, turned;            ///< the current ideal tool, before and after its turn
   ToolPose last;                        ///< the virtual tool at the last tick

@@ -23,6 +23,7 @@
 #include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "stimuli/shapes.h"
+#include "stimuli/texture.h"
 
 namespace palpate::runner {
 namespace {
@@ -58,14 +59,52 @@ std::string shape_key(const stimuli::ObjectSpec& spec, bool side_contact) {
          spec.file;
 }
 
+/// Empty: it is smooth. Equal keys, equal textures.
+std::string texture_key(const stimuli::ObjectSpec& spec) {
+  if (!spec.texture || spec.texture->depth == 0) return {};
+  const stimuli::TextureSpec& t = *spec.texture;
+  std::string key = std::to_string(static_cast<int>(t.kind)) + (t.around ? "a" : "d");
+  for (const double value : {t.period, t.depth, t.direction.x, t.direction.y, t.direction.z,
+                             t.phase, stimuli::ridge_of(t), stimuli::ramp_of(t), t.tip_radius,
+                             t.jitter, t.exponent, t.longest.value_or(0), spec.radius})
+    key += ' ' + key_of(value);
+  return key + ' ' + std::to_string(t.seed) + ' ' + t.file;
+}
+
 /// Of a mesh file and its material: of the surface that stands alone.
 std::string surface_key(const stimuli::ObjectSpec& spec) {
   std::string key = shape_key(spec, false);
   const stimuli::Material& m = spec.material;
   for (const double value : {m.stiffness, m.damping, m.friction_static, m.friction_dynamic})
     key += ' ' + key_of(value);
-  return key;
+  return key + ' ' + texture_key(spec);
 }
+
+Pose inverse(const Pose& pose) {
+  const Quat back = glm::conjugate(pose.orientation);
+  return {-(back * pose.position), back};
+}
+
+/// The texture as a mesh sees it that has this pose in the object.
+std::shared_ptr<const stimuli::Texture> seen_from(
+    const std::shared_ptr<const stimuli::Texture>& texture, const Pose& in_object) {
+  if (texture == nullptr) return nullptr;
+  return std::make_shared<const stimuli::Texture>(texture->in_frame(in_object));
+}
+
+/// What objects have to feel beside their surface.
+std::vector<rendering::ObjectEffects> effects_of(const std::vector<stimuli::ObjectSpec>& objects) {
+  std::vector<rendering::ObjectEffects> out;
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    const stimuli::ObjectSpec& spec = objects[i];
+    if (spec.fields.empty() && !spec.transient) continue;
+    out.push_back(
+        {static_cast<int>(i), spec.pose, spec.body.has_value(), spec.fields, spec.transient});
+  }
+  return out;
+}
+
+constexpr double kSteepestTexture = 2;  // of its slope
 
 constexpr std::size_t kLargeMesh = 50'000;  // faces; worth another thread
 
@@ -169,7 +208,9 @@ struct SceneBuilder::Placing {
   bool has_layers;  ///< anywhere: then its whole surface says where it ends
   bool by_surface;  ///< what is felt of its own surface is one closed surface
   std::vector<rendering::SceneObject>& out;
-  std::vector<PlacedShape> all = {}, layered = {};  ///< its shapes; those that have layers
+  std::vector<PlacedShape> all = {}, layered = {};       ///< its shapes; those that have layers
+  std::shared_ptr<const stimuli::Texture> texture = {};  ///< of the object that is placed
+  Pose object_pose = {};                                 ///< its own
 
   void add(int object, int layer, const stimuli::Layer& of, const Prepared& prepared,
            const Pose& pose) {
@@ -301,6 +342,11 @@ void SceneBuilder::place(const stimuli::ObjectSpec& spec, const Pose& parent, in
   }
   stimuli::Material surface = spec.material;
   surface.layers.clear();
+  const bool is_object = pose.position == placing.object_pose.position &&
+                         pose.orientation == placing.object_pose.orientation;
+  surface.texture =
+      is_object ? placing.texture
+                : seen_from(placing.texture, stimuli::compose(inverse(placing.object_pose), pose));
   const bool in_parts = surface.stiffness > 0 ? !placing.by_surface : placing.has_layers;
   if (in_parts) {
     for (const Prepared& part : prepare(spec, 0, placing.side_contact)) {
@@ -323,7 +369,7 @@ void SceneBuilder::take_large_surface(const stimuli::ObjectSpec& spec, stimuli::
                                       LoadedMesh& loaded) {
   std::shared_ptr<const rendering::Surface> prepared;
   const auto prepare_it = [&](const stimuli::ClosedSurface& unchecked) {
-    if (!(spec.material.stiffness > 0)) return;
+    if (!(spec.material.stiffness > 0) || spec.texture) return;
     stimuli::Material material = spec.material;
     material.layers.clear();
     const std::vector<rendering::SurfaceShell> shells = {
@@ -341,6 +387,39 @@ void SceneBuilder::take_large_surface(const stimuli::ObjectSpec& spec, stimuli::
     surfaces_.emplace(surface_key(spec), std::move(prepared));
   loaded.surface = std::make_shared<const stimuli::ClosedSurface>(std::move(cleaned.surface));
   loaded.notes = std::move(cleaned.notes);
+}
+
+std::shared_ptr<const stimuli::Texture> SceneBuilder::texture_of(const stimuli::ObjectSpec& spec) {
+  const std::string key = texture_key(spec);
+  if (key.empty()) return nullptr;
+  std::shared_ptr<const stimuli::Texture>& known = textures_[key];
+  if (known == nullptr) {
+    try {
+      known = std::make_shared<const stimuli::Texture>(*spec.texture, spec.radius);
+    } catch (const std::invalid_argument& error) {
+      throw stimuli::MeshError({std::string("/texture: ") + error.what()});
+    }
+  }
+  std::ostringstream fault;
+  if (known->greatest_slope() > kSteepestTexture) {
+    fault << "/texture/depth_m: expected a slope of at most 2; the steepest is "
+          << known->greatest_slope();
+  } else {
+    std::vector<Vec3> corners;
+    add_corners(spec, Pose{}, corners);
+    Vec3 low(std::numeric_limits<double>::max()), high = -low;
+    for (const Vec3& v : corners) {
+      low = glm::min(low, v);
+      high = glm::max(high, v);
+    }
+    const Vec3 size = high - low;
+    const double thickness = std::min({size.x, size.y, size.z});
+    if (!corners.empty() && spec.texture->depth > thickness)
+      fault << "/texture/depth_m: expected at most the thickness of the object, " << thickness
+            << " m";
+  }
+  if (!fault.str().empty()) throw stimuli::MeshError({fault.str()});
+  return known;
 }
 
 const LoadedMesh& SceneBuilder::mesh(const stimuli::ObjectSpec& spec) {
@@ -464,7 +543,7 @@ std::vector<std::vector<int>> SceneBuilder::solids_of(
     std::optional<StandingSurface> surface = {};
   };
   const auto is_fixed = [](const stimuli::ObjectSpec& object) {
-    return !object.body && !object.soft;
+    return !object.body && !object.soft && object.shape != stimuli::ShapeKind::none;
   };
   std::vector<std::optional<Standing>> standing_here(objects.size());
   const bool several = std::ranges::count_if(objects, is_fixed) > 1;
@@ -520,8 +599,12 @@ void SceneBuilder::place_parts(const std::vector<stimuli::ObjectSpec>& objects,
     std::string reason = "layers need convex parts, and it cannot be cut into them: ";
     try {
       if (object == solid.front()) {
-        for (const int one : solid)
-          place(objects[static_cast<std::size_t>(one)], Pose{}, one, placing);
+        for (const int one : solid) {
+          const stimuli::ObjectSpec& spec = objects[static_cast<std::size_t>(one)];
+          placing.texture = texture_of(spec);
+          placing.object_pose = spec.pose;
+          place(spec, Pose{}, one, placing);
+        }
       }
       place_layers(object, placing);
       const std::string meets = met_by(objects, index);
@@ -574,7 +657,12 @@ SceneBuilder::Placed SceneBuilder::placed(const std::vector<stimuli::ObjectSpec>
   std::vector<rendering::SurfaceShell> shells;
   for (const int object : solid) {
     const stimuli::ObjectSpec& spec = objects[static_cast<std::size_t>(object)];
+    const std::size_t before = shells.size();
     add_shells(spec, alone ? Pose{} : spec.pose, true, shells);
+    if (const auto texture = texture_of(spec); texture != nullptr) {
+      for (std::size_t i = before; i < shells.size(); ++i)
+        shells[i].material.texture = alone ? texture : seen_from(texture, inverse(spec.pose));
+    }
     placed.of_shell.resize(shells.size(), object);
   }
   if (shells.empty()) {
@@ -596,7 +684,7 @@ SceneBuilder::Placed SceneBuilder::placed(const std::vector<stimuli::ObjectSpec>
 
 rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& objects,
                                      bool side_contact, const rendering::Tool& tool,
-                                     const Vec3& gravity, double soft_radius) {
+                                     const Vec3& gravity, double soft_radius, double grip) {
   std::vector<rendering::SceneObject> parts, shown, solids;
   std::vector<rendering::SceneSurface> surfaces;
   std::vector<std::shared_ptr<const rendering::SoftObject>> soft;
@@ -604,6 +692,7 @@ rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& obj
   for (const std::vector<int>& solid : solids_of(objects)) {
     const auto index = static_cast<std::size_t>(solid.front());
     const stimuli::ObjectSpec& first = objects[index];
+    if (first.shape == stimuli::ShapeKind::none) continue;
     try {
       const Placed placed_here = placed(objects, solid, side_contact);
       const std::vector<rendering::SceneObject>& own = placed_here.parts;
@@ -629,9 +718,11 @@ rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& obj
     rendering::Scene others =
         rendering::moving_scene(std::move(parts), moving_of(objects), gravity, side_contact, tool,
                                 true, std::move(surfaces), std::move(solids));
-    if (soft.empty()) return others;
-    return rendering::soft_scene(std::move(others), std::move(shown), std::move(soft), side_contact,
-                                 tool);
+    if (!soft.empty())
+      others = rendering::soft_scene(std::move(others), std::move(shown), std::move(soft),
+                                     side_contact, tool);
+    others.set_effects({effects_of(objects), grip});
+    return others;
   } catch (const std::invalid_argument& error) {
     throw stimuli::MeshError({error.what()});
   }
@@ -640,7 +731,8 @@ rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& obj
 StimulusLibrary::StimulusLibrary(const protocols::Protocol& protocol, SceneBuilder builder)
     : soft_radius_(protocol.tool.radius > 0 ? protocol.tool.radius : protocols::kSoftRadius),
       gravity_(protocol.gravity),
-      tool_(tool_of(protocol.tool)) {
+      tool_(tool_of(protocol.tool)),
+      grip_(grip_from_virtual_tip(protocol)) {
   for (const protocols::StimulusSpec& stimulus : protocols::with_all_levels(protocol).stimuli) {
     double reach = 0;
     soft_.emplace_back();
@@ -684,6 +776,8 @@ StimulusLibrary::StimulusLibrary(const protocols::Protocol& protocol, SceneBuild
       }
       (sides ? with_sides_ : without_sides_).push_back(std::move(objects));
     }
+    effects_.push_back(effects_of({stimulus.object}));
+    textures_.push_back(builder.texture_of(stimulus.object));
     moving_.push_back(builder.moving_of({stimulus.object}));
     reaches_.push_back(reach);
   }
@@ -706,17 +800,24 @@ rendering::Scene StimulusLibrary::scene(const protocols::Trial& trial) const {
   for (rendering::SceneSurface& surface : surfaces)
     surface.pose = stimuli::compose({Vec3(0), trial.orientation}, surface.pose);
   std::shared_ptr<const rendering::SoftObject> soft = soft_[trial.stimulus];
+  std::vector<rendering::ObjectEffects> effects = effects_[trial.stimulus];
+  for (rendering::ObjectEffects& object : effects)
+    object.pose = stimuli::compose({Vec3(0), trial.orientation}, object.pose);
+  const auto with_effects = [&](rendering::Scene scene) {
+    scene.set_effects({std::move(effects), grip_});
+    return scene;
+  };
   if (soft == nullptr)
-    return rendering::moving_scene(std::move(objects), moving, gravity_, sides, tool_, true,
-                                   std::move(surfaces));
+    return with_effects(rendering::moving_scene(std::move(objects), moving, gravity_, sides, tool_,
+                                                true, std::move(surfaces)));
   if (trial.orientation != Quat(1, 0, 0, 0)) {
     const stimuli::ObjectSpec& spec = specs_[trial.stimulus];
     soft = rendering::build_soft_object(spec,
                                         stimuli::compose({Vec3(0), trial.orientation}, spec.pose),
                                         {soft_radius_, gravity_, 0});
   }
-  return rendering::soft_scene(rendering::Scene({}, sides, tool_), std::move(objects), {soft},
-                               sides, tool_);
+  return with_effects(rendering::soft_scene(rendering::Scene({}, sides, tool_), std::move(objects),
+                                            {soft}, sides, tool_));
 }
 
 }  // namespace palpate::runner

@@ -17,6 +17,7 @@
 #include "runner/sharp_edges.h"
 #include "runner/workspace_map.h"
 #include "stimuli/polygon_soup.h"
+#include "stimuli/shapes.h"
 
 namespace palpate::runner {
 
@@ -45,17 +46,22 @@ struct LoadedMesh {
 /// file is read once, however many scenes are built.
 class SceneBuilder {
  public:
+  static constexpr double kSceneGrip = 0.06;  ///< m, of scenes, which do not say where the hand is
   /// Reads a mesh file, other than of tetrahedra, if that has not been done.
   /// \throws MeshError, std::runtime_error for an unreadable file
   const LoadedMesh& mesh(const stimuli::ObjectSpec& spec);
+  /// Null: it is smooth. In the object's frame. \throws MeshError: its steepest slope exceeds 2, or
+  /// it is deeper than the object is thick
+  std::shared_ptr<const stimuli::Texture> texture_of(const stimuli::ObjectSpec& spec);
   /// \throws MeshError with the place as a JSON pointer: a shape cannot be cut into convex parts, a
   /// layer is empty or cannot be made of convex parts (inset_union), or a moving object exceeds a
   /// limit.
   /// \param gravity  m/s^2, on what moves or gives
   /// \param soft_radius  m, of the tool where it touches what gives
+  /// \param grip  m, from the virtual tip: where fields at the grip act
   rendering::Scene build(const std::vector<stimuli::ObjectSpec>& objects, bool side_contact,
                          const rendering::Tool& tool = {}, const Vec3& gravity = Vec3(0),
-                         double soft_radius = protocols::kSoftRadius);
+                         double soft_radius = protocols::kSoftRadius, double grip = kSceneGrip);
   /// The indices of all objects, in sets that one ideal tool feels: fixed objects that touch or
   /// cross each other, and each other object alone.
   std::vector<std::vector<int>> solids_of(const std::vector<stimuli::ObjectSpec>& objects);
@@ -110,6 +116,7 @@ class SceneBuilder {
   std::map<std::string, LoadedMesh> meshes_;               ///< by shape
   std::map<std::string, std::shared_ptr<const stimuli::ClosedSurface>> convex_;  ///< by shape
   std::map<std::string, std::shared_ptr<const rendering::Surface>> surfaces_;
+  std::map<std::string, std::shared_ptr<const stimuli::Texture>> textures_;
 };
 
 /// The stimuli of a protocol, and each at every level known in advance (levels.h), built
@@ -124,6 +131,8 @@ class StimulusLibrary {
   std::size_t size() const { return reaches_.size(); }  ///< stimuli
   /// Nothing to feel, as the trial's renderer has it.
   rendering::Scene empty_scene(protocols::RendererKind renderer) const;
+  /// Null: it is smooth.
+  const stimuli::Texture* texture(std::size_t stimulus) const { return textures_[stimulus].get(); }
   /// Radius of the sphere about the origin that contains the stimulus in any orientation, m.
   double reach(int stimulus) const { return reaches_[stimulus]; }
   /// Of the stimulus as the protocol has it, not turned.
@@ -139,10 +148,13 @@ class StimulusLibrary {
   std::vector<stimuli::ObjectSpec> specs_;  ///< of the soft ones; others are left empty
   double soft_radius_;
   std::vector<std::vector<rendering::MovingObject>> moving_;  ///< by stimulus: itself or nothing
+  std::vector<std::shared_ptr<const stimuli::Texture>> textures_;  ///< by stimulus
   std::vector<double> reaches_;
   std::vector<SharpEdges> edges_;
   Vec3 gravity_;  ///< m/s^2
   rendering::Tool tool_;
+  double grip_;                                                 ///< m, from the virtual tip
+  std::vector<std::vector<rendering::ObjectEffects>> effects_;  ///< by stimulus: none or one
 };
 
 }  // namespace palpate::runner

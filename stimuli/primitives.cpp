@@ -284,6 +284,7 @@ PolygonSoup polygons_of(const ObjectSpec& spec) {
       check_reach(soup, spec.file);
       return soup;
     }
+    case ShapeKind::none:
     case ShapeKind::compound:
       break;
   }
@@ -306,6 +307,7 @@ SurfaceDistance signed_distance(const ObjectSpec& primitive, const Vec3& point) 
       return revolved(to_cone(primitive.radius, primitive.height, from_axis, point.z), point,
                       from_axis);
     case ShapeKind::mesh:
+    case ShapeKind::none:
     case ShapeKind::compound:
       break;
   }

@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <stdexcept>
@@ -18,7 +19,16 @@ namespace palpate::stimuli {
 // An object as a scene file or protocol describes it, as plain values (the keys:
 // protocols/scene.schema.json). SI units.
 
-enum class ShapeKind { sphere, cone, cylinder, cube, box, mesh, compound };
+enum class ShapeKind {
+  sphere,
+  cone,
+  cylinder,
+  cube,
+  box,
+  mesh,
+  none,  ///< no surface: force fields alone
+  compound
+};
 
 /// A layer of an object: its surface moved inwards, felt beside the surface.
 struct Layer {
@@ -28,6 +38,70 @@ struct Layer {
   std::optional<double> break_force = std::nullopt;  ///< N; a greater force breaks the layer
 };
 
+class Texture;
+
+/// The fine structure of an object's surface (texture.h), as its file has it.
+struct TextureSpec {
+  enum class Kind {
+    sine,       ///< ridges across `direction`
+    trapezoid,  ///< the same with flat tops and smooth flanks
+    cones,      ///< truncated cones on a square grid
+    noise,      ///< 1/f^exponent between two wavelengths
+    image,      ///< the grey values of a picture, white: a crest
+  };
+  Kind kind = Kind::sine;
+  double period = 0.002;    ///< m; cones: their mean spacing; noise: the shortest wave
+  double depth = 0;         ///< m, from crest to valley; 0: a smooth surface
+  Vec3 direction{1, 0, 0};  ///< unit, across the ridges, in the object's frame
+  bool around = false;      ///< ridges along the meridians of +z, instead of `direction`
+  double phase = 0;         ///< degrees; 0: a crest at the object's origin
+  std::optional<double> ridge = std::nullopt;  ///< m, of a flat top; default period / 2
+  std::optional<double> ramp = std::nullopt;   ///< m, of a flank; default period / 8
+  double tip_radius = 0;   ///< m, of the ball that feels the texture; 0: a point
+  double jitter = 0;       ///< of a cone's place, 0 to 1, of half the free way to its neighbours
+  std::uint64_t seed = 0;  ///< of cones and noise
+  double exponent = 1;     ///< noise
+  std::optional<double> longest = std::nullopt;  ///< m, of waves of noise; default 16 periods
+  std::string file_name;                         ///< image: as the scene or protocol names it
+  std::string file;                              ///< image: resolved path
+  std::shared_ptr<const std::string> file_bytes = nullptr;  ///< image: the PNG file
+};
+
+/// A force that depends on where the hand is or how it moves, without a surface. In the object's
+/// frame, in which it moves.
+struct FieldSpec {
+  enum class Kind {
+    constant,   ///< force
+    spring,     ///< towards a ball
+    channel,    ///< towards a tube about a segment
+    viscous,    ///< -B v
+    curl,       ///< b axis x v
+    vibration,  ///< amplitude sin(2 pi f t) along a direction
+  };
+  Kind kind = Kind::constant;
+  bool at_grip = false;        ///< acts on the grip of the stylus; false: on its tip
+  Vec3 force{0};               ///< N
+  Vec3 centre{0};              ///< m; spring: the ball's; channel: one end of the segment
+  Vec3 to{0};                  ///< m; channel: the other end
+  double radius = 0;           ///< m; spring: of the ball; channel: half its width
+  double stiffness = 0;        ///< N/m
+  Mat3 damping{0};             ///< N s/m; curl: the scalar is damping[0][0]
+  bool destabilising = false;  ///< viscous: may feed energy
+  double low_pass = 0.002;     ///< s, of the velocity
+  Vec3 axis{0, 0, 1};          ///< unit; curl: right-handed about it; vibration: along it
+  double amplitude = 0;        ///< N
+  double frequency = 0;        ///< Hz
+  bool always = false;         ///< vibration: also without contact
+};
+
+/// The knock of a contact: F_n += A v exp(-t/tau) sin(2 pi f t) from the first contact on, v the
+/// speed of entry. Okamura, Dennerlein & Howe 1998.
+struct TransientSpec {
+  double amplitude = 10;   ///< N per m/s; 0: none
+  double frequency = 100;  ///< Hz
+  double decay = 0.01;     ///< s, tau
+};
+
 /// Mechanical properties of an object. Terms that are 0 or empty are left out of the tick.
 struct Material {
   double stiffness = 800;       ///< N/m, along the contact normal, from the surface on
@@ -35,6 +109,8 @@ struct Material {
   double friction_static = 0;   ///< Coulomb's coefficient while the contact sticks; >= dynamic
   double friction_dynamic = 0;  ///< while it slides
   std::vector<Layer> layers;    ///< of other stiffness under the surface, by increasing depth
+  /// In the frame of the mesh that carries the material; null: smooth.
+  std::shared_ptr<const Texture> texture = nullptr;
 
   bool has_friction() const { return friction_static > 0; }
 };
@@ -89,6 +165,9 @@ struct ObjectSpec {
   Material material;
   std::optional<Body> body = std::nullopt;  ///< nullopt: it stands still
   std::optional<Soft> soft = std::nullopt;  ///< nullopt: it is rigid
+  std::optional<TextureSpec> texture = std::nullopt;
+  std::vector<FieldSpec> fields = {};
+  std::optional<TransientSpec> transient = std::nullopt;
 };
 
 struct ShapeTraits {
@@ -132,6 +211,8 @@ constexpr ShapeTraits traits_of(ShapeKind shape) {
       return {.name = "box", .size = true, .analytic = true};
     case ShapeKind::mesh:
       return {.name = "mesh"};
+    case ShapeKind::none:
+      return {.name = "none"};
     case ShapeKind::compound:
       return {.name = "compound"};
   }

@@ -106,8 +106,8 @@ LOOKS_INSIDE = {"runner/evidence/accuracy", "runner/evidence/scenes", "runner/ev
 # The headers of a room that other rooms use; all others are the room's own business (and that of the rooms within).
 PUBLIC = {
     "stimuli": "closed_surface shapes convex_mesh grid_hull inset large_array mesh_file orientation polygon_soup "
-               "parts/convex_parts parts/facets primitives solids/solid_mesh vec",
-    "rendering": "first_contact probe reach render_fault renderer scene tool",
+               "parts/convex_parts parts/facets primitives solids/solid_mesh texture vec",
+    "rendering": "field_demand fields first_contact probe reach render_fault renderer scene tool",
     "rendering/bodies": "moving_scene",
     "runner/evidence/verification": "explain extreme_cases random_solids reference search surface_reference union_cases",
     "runner/evidence/scenes": "feature_costs scene_study",
@@ -143,7 +143,7 @@ PUBLIC = {
                             "scene_renderer",
     "runner/participants": "keyboard respondent simulated_settings simulated "
                            "task_participant",
-    "runner/session": "device_check live_forces live_session markers recorded_outcome sample_stream session_scenes signals "
+    "runner/session": "device_check effect_check live_forces live_session markers recorded_outcome sample_stream session_scenes signals "
                       "preflight run_record replay session session_end simulated_study "
                       "socket_advisor station",
     "runner/output": "outputs progress_line",
@@ -155,7 +155,7 @@ PUBLIC = {
     "runner/study": "export_settings simulation_limits study_order study_trials task_words",
     "runner/serve": "network served_scene served_session",
     "runner/sweep": "cluster_folder cluster_job slurm swept_study",
-    "runner/evidence/stability": "boundary scene_boundary",
+    "runner/evidence/stability": "boundary effect_stability scene_boundary",
     "runner/evidence": "tick_meters",
     "runner/commands": "shared/command",
 }

@@ -23,6 +23,8 @@ using nlohmann::json;
 /// Adds the contents of an object's mesh files, by name.
 void add_files(const stimuli::ObjectSpec& object, StoredFiles& files) {
   if (object.file_bytes) files.emplace(object.file_name, *object.file_bytes);
+  if (object.texture && object.texture->file_bytes)
+    files.emplace(object.texture->file_name, *object.texture->file_bytes);
   for (const stimuli::ObjectSpec& part : object.parts) add_files(part, files);
 }
 
@@ -51,8 +53,14 @@ stimuli::ObjectSpec read_again(const json& value, const Protocol& protocol,
 }
 
 /// Endings of names, and the unit that each stands for.
-constexpr std::array<std::pair<std::string_view, const char*>, 7> kUnits = {
-    {{"_n_per_m", "N/m"},
+constexpr std::array<std::pair<std::string_view, const char*>, 13> kUnits = {
+    {{"_m_per_s", "m/s"},
+     {"_rad_per_s", "rad/s"},
+     {"_per_s", "1/s"},
+     {"_deg", "deg"},
+     {"_hz", "Hz"},
+     {"_s", "s"},
+     {"_n_per_m", "N/m"},
      {"_ns_per_m", "N s/m"},
      {"_n", "N"},
      {"_kg_per_m3", "kg/m^3"},

@@ -141,6 +141,9 @@ void Outputs::protect_files(const stimuli::ObjectSpec& object) {
   inputs_.add(object.file, "it is a mesh that is read, so it must not be overwritten");
   for (const std::string& file : object.files_read)
     inputs_.add(file, object.file_name + " takes its data from it, so it must not be overwritten");
+  if (object.texture && !object.texture->file.empty())
+    inputs_.add(object.texture->file,
+                "it is a texture that is read, so it must not be overwritten");
   for (const stimuli::ObjectSpec& part : object.parts) protect_files(part);
 }
 

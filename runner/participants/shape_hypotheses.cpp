@@ -184,6 +184,7 @@ std::vector<Mat3> formula_rotations(stimuli::ShapeKind kind) {
       return {Mat3(1)};
     case stimuli::ShapeKind::box:
     case stimuli::ShapeKind::mesh:
+    case stimuli::ShapeKind::none:
     case stimuli::ShapeKind::compound:
       break;
   }

@@ -673,6 +673,7 @@ void visit_line_class(const ShapeHypotheses::Shape& shape, Visit&& visit) {
       break;
     case stimuli::ShapeKind::box:
     case stimuli::ShapeKind::mesh:
+    case stimuli::ShapeKind::none:
     case stimuli::ShapeKind::compound:
       break;  // these have a field
   }

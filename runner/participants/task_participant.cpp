@@ -37,6 +37,8 @@ double distance_to(const stimuli::ObjectSpec& object, const Vec3& point) {
       return std::numeric_limits<double>::quiet_NaN();
     case stimuli::ShapeKind::box:
       return box_distance(object.size, local);
+    case stimuli::ShapeKind::none:  // nothing is there to touch
+      return std::numeric_limits<double>::infinity();
     case stimuli::ShapeKind::compound: {
       double least = std::numeric_limits<double>::infinity();
       for (const stimuli::ObjectSpec& part : object.parts) {
@@ -374,10 +376,12 @@ double TaskJudgement::number() {
     const double rated = middle + settings_.rating + settings_.rating_sd * random_.normal();
     return std::clamp(std::round(rated), asked.least.value_or(rated), asked.most.value_or(rated));
   }
+  const bool of_period = asked.level && asked.level->pointer == "/texture/period_m";
+  const double exponent = of_period ? settings_.period_exponent : settings_.exponent;
   double scale = 10;
   if (asked.standard && asked.modulus > 0 && estimates_.size() > 1)
-    scale = asked.modulus / std::pow(std::abs(estimates_.front()), settings_.exponent);
-  const double judged = scale * std::pow(std::abs(last_level_), settings_.exponent) *
+    scale = asked.modulus / std::pow(std::abs(estimates_.front()), exponent);
+  const double judged = scale * std::pow(std::abs(last_level_), exponent) *
                         std::exp(settings_.number_sd * random_.normal());
   const double rounded = std::round(judged * 100) / 100;
   return std::clamp(rounded, asked.least.value_or(rounded), asked.most.value_or(rounded));

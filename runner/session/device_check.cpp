@@ -12,6 +12,7 @@
 #include "data/files/utc.h"
 #include "protocols/schedule.h"
 #include "protocols/tasks/levels.h"
+#include "runner/session/effect_check.h"
 
 namespace palpate::runner::session {
 namespace {
@@ -244,7 +245,7 @@ bool in_millimetres(const stimuli::ObjectSpec& object, double radius) {
 /// it describes the last one and counts the others.
 class StimulusFaults {
  public:
-  enum class Check { material, workspace };
+  enum class Check { material, workspace, effects };
   /// \param name  of the stimulus; at a level: "NAME at LEVEL"
   void add(const std::string& name, Check check, const std::string& fault) {
     const std::size_t at = name.rfind(" at ");
@@ -514,9 +515,23 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
                               ? "or have it limited by /servo/material_limit \"limit\""
                               : "or keep the levels below"));
     };
-    visit_materials(stimulus.object,
-                    [&](const stimuli::Material& material) { check_material(material, ""); });
-    if (!refused) check_material(felt_material(stimulus.object), "in all its parts ");
+    const bool surface = stimulus.object.shape != stimuli::ShapeKind::none;
+    if (surface)
+      visit_materials(stimulus.object,
+                      [&](const stimuli::Material& material) { check_material(material, ""); });
+    if (surface && !refused) check_material(felt_material(stimulus.object), "in all its parts ");
+    const double rate = shown_rate(protocol, device);
+    if (!refused && !stimulus.object.fields.empty()) {
+      stimuli::Material all = felt_material(stimulus.object);
+      if (!surface) all.stiffness = all.damping = 0;
+      const rendering::FieldDemand demand =
+          rendering::demand_of(stimulus.object.fields, rate, device.resolution);
+      all.stiffness += demand.stiffness;
+      all.damping = std::abs(all.damping) + demand.damping;
+      check_material(all, "with its /fields ");
+    }
+    for (const std::string& fault : effect_faults(stimulus.object, rate, device))
+      faults.add(stimulus.name, StimulusFaults::Check::effects, fault);
     const double radius =
         (library.reach(static_cast<int>(i)) + protocol.home.margin) / protocol.workspace.scale;
     const std::string fault = workspace_fault(protocol, radius, device);

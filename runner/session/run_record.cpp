@@ -17,6 +17,7 @@ void add_file(const std::string& name, const std::shared_ptr<const std::string>&
 void add_files(const stimuli::ObjectSpec& spec, std::vector<data::ProtocolFile>& files) {
   for (const stimuli::ObjectSpec& part : spec.parts) add_files(part, files);
   add_file(spec.file_name, spec.file_bytes, files);
+  if (spec.texture) add_file(spec.texture->file_name, spec.texture->file_bytes, files);
 }
 
 void add_files(const protocols::Protocol& protocol, std::vector<data::ProtocolFile>& files) {

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "data/base/text.h"
+#include "runner/session/effect_check.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/polygon_soup.h"
@@ -123,6 +124,11 @@ std::vector<std::string> scene_notes(const protocols::SceneSpec& spec,
   for (std::size_t i = 0; i < spec.objects.size(); ++i) {
     for (const std::string& note : mesh_notes(spec.objects[i], builder))
       notes.push_back("/objects/" + std::to_string(i) + ": " + note);
+    constexpr double kUsualRate = 1000;  // Hz
+    const auto texture = builder.texture_of(spec.objects[i]);
+    for (const std::string& note :
+         session::effect_notes(spec.objects[i], texture.get(), kUsualRate))
+      notes.push_back("/objects/" + std::to_string(i) + note);
   }
   for (const auto& object : rendering::soft_objects(scene)) {
     if (const auto felt = elements_felt(*object))

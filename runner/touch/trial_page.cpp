@@ -27,6 +27,7 @@
 #include "runner/safety/fault_signals.h"
 #include "runner/scene_builder.h"
 #include "runner/session/replay.h"
+#include "stimuli/texture.h"
 
 namespace palpate::runner::touch {
 namespace {
@@ -323,7 +324,9 @@ class PageBuilder {
     const std::vector<data::IntervalRecord> intervals = data::intervals_of(record);
     Json parts = Json::array();
     for (std::size_t i = 0; i < ticks.intervals.size(); ++i) {
-      const std::string label = printable(stimulus_words(intervals[i]));
+      std::string label = printable(stimulus_words(intervals[i]));
+      if (i < objects.size() && objects[i] && objects[i]->texture)
+        label += ", " + stimuli::in_words(*objects[i]->texture);
       Json part = {{"ticks", ticks.intervals[i]},
                    {"label", "interval " + std::to_string(i + 1) + ": " + label + ", " +
                                  renderer_words(intervals[i].renderer, other)},

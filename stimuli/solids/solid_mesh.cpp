@@ -186,6 +186,7 @@ SolidMesh mesh_of_primitive(const ObjectSpec& spec, int resolution) {
       return mesh_of_ball(spec.radius, resolution);
     case ShapeKind::cone:
     case ShapeKind::mesh:
+    case ShapeKind::none:
     case ShapeKind::compound:
       break;
   }

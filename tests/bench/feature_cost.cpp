@@ -52,7 +52,7 @@ rendering::Rendering without_broad_phase(const rendering::Scene& scene,
                                          Probe::kSegment ? glm::length(probe.tail - probe.tip) : 0};
   if (!rendering::tick::within_range(probe.tip) || !rendering::tick::within_range(probe.tail))
     return rendering::tick::no_contact(state.last, rendering::render_fault::kNonFinite);
-  under_way.add_contacts();
+  under_way.template add_contacts<false>();
   const std::span<rendering::LoadedContact> contacts(state.contacts);
   rendering::load(contacts);
   state.last = probe;

@@ -17,7 +17,7 @@ PROGRAM_ONLY = {
     "keys-that-are-one", "keys-that-are-one-elsewhere",
     "keys-given-twice", "labels-alike", "layers-out-of-order", "material-twice", "max-run-alone", "min-distance-too-far", "more-blocks-than-repetitions",
     "more-sessions-than-trials", "quaternions", "same-names", "stimulus-without-key", "surface-without-layers",
-    "too-many-trials", "tool-radius", "tool-segment-without-length", "two-keys",
+    "too-many-trials", "tool-radius", "tool-segment-without-length", "textures-together", "two-keys", "fields-that-feed-energy",
     "v2-adjust-limits", "v2-codes-of-no-answer", "v2-answer-without-key", "v2-criterion-with-an-adaptive-procedure", "v2-easier-of-the-other-side", "v2-labels-alike", "v2-level-axis-of-no-length", "v2-level-nowhere",
     "v2-level-of-another-shape", "v2-level-out-of-range",
     "v2-names-alike", "v2-order-of-an-adaptive-block", "v2-order-without-solution", "v2-page-before-unknown-block",
@@ -146,15 +146,15 @@ class Protocols:
         return failures
 
     def of_unused_keys(self):
-        """The parser accepts everything.json, so it knows every key that the schema names."""
+        """The parser accepts these files, so it knows every key that the schema names."""
         def keys_in(*names):
             return set().union(*(keys(read(self.files / "good" / name)) for name in names))
 
         failures = []
-        unused = properties(self.protocol.schema) - keys_in("everything.json")
+        unused = properties(self.protocol.schema) - keys_in("everything.json", "scene-textures.json")
         unused -= {"objects"}  # of scenes
         if unused:
-            failures.append(f"everything.json lacks {sorted(unused)}")
+            failures.append(f"everything.json and scene-textures.json lack {sorted(unused)}")
         own = {k: v for k, v in self.version_2.schema.items() if k != "$defs"}
         own["$defs"] = {k: v for k, v in self.version_2.schema["$defs"].items() if k != "one"}
         unused = properties(own) - keys_in("everything-v2.json", "external-v2.json", "procedures-v2.json")

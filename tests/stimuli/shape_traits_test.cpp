@@ -14,7 +14,7 @@ namespace {
 namespace shape_traits {
 
 bool is_primitive(ShapeKind shape) {
-  return shape != ShapeKind::mesh && shape != ShapeKind::compound;
+  return shape != ShapeKind::mesh && shape != ShapeKind::compound && shape != ShapeKind::none;
 }
 
 /// Whether a change of the description changes the polygons.

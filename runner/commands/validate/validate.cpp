@@ -20,6 +20,7 @@
 #include "runner/devices/simulated.h"
 #include "runner/serve/served_scene.h"
 #include "runner/session/device_check.h"
+#include "runner/session/effect_check.h"
 #include "runner/session/simulated_study.h"
 #include "runner/station/protocol_check.h"
 #include "runner/study/task_words.h"
@@ -45,6 +46,7 @@ void check_meshes(const stimuli::ObjectSpec& object, const std::string& pointer,
     }
     return;
   }
+  if (object.shape == stimuli::ShapeKind::none) return;
   const std::string where = object.shape == stimuli::ShapeKind::mesh ? pointer + "/file" : pointer;
   try {
     if (stimuli::is_gmsh_file_name(object.file)) {
@@ -217,6 +219,23 @@ void add_buzzing(const stimuli::ObjectSpec& object, const std::string& place,
   if (!can.reason.empty()) reasons.push_back(place + " has " + can.reason);
 }
 
+/// The same with what its texture, fields and knock ask of the device.
+void add_faults(const stimuli::ObjectSpec& object, const std::string& place,
+                const protocols::Protocol& shown, const servo::DeviceCapabilities& device,
+                std::vector<std::string>& reasons) {
+  if (object.shape != stimuli::ShapeKind::none) add_buzzing(object, place, shown, device, reasons);
+  for (const std::string& fault : session::effect_faults(object, shown.servo_rate, device))
+    reasons.push_back(place + fault);
+  const rendering::FieldDemand demand =
+      rendering::demand_of(object.fields, shown.servo_rate, device.resolution);
+  stimuli::Material fields;
+  fields.stiffness = demand.stiffness;
+  fields.damping = demand.damping;
+  const session::ShowableMaterial can =
+      session::showable(fields, device, shown.servo_rate, session::felt_gain(shown), false);
+  if (!can.reason.empty()) reasons.push_back(place + "/fields has " + can.reason);
+}
+
 /// Which devices can show the materials of a scene, through its tool and reach, or why not.
 std::vector<station::Verdict> scene_verdicts(const protocols::SceneSpec& spec) {
   const protocols::Protocol shown =
@@ -229,7 +248,7 @@ std::vector<station::Verdict> scene_verdicts(const protocols::SceneSpec& spec) {
     station::Verdict& verdict = out.emplace_back();
     verdict.name = kind.name;
     for (std::size_t i = 0; i < spec.objects.size(); ++i)
-      add_buzzing(spec.objects[i], "/objects/" + std::to_string(i), shown, can, verdict.reasons);
+      add_faults(spec.objects[i], "/objects/" + std::to_string(i), shown, can, verdict.reasons);
   }
   return out;
 }
@@ -324,6 +343,9 @@ void print_protocol(const protocols::Protocol& protocol, SceneBuilder builder,
     const rendering::SoftObject* const soft = library.soft(i);
     const auto felt = soft != nullptr ? touch::elements_felt(*soft) : std::nullopt;
     if (felt) out << "  note        stimulus " << protocol.stimuli[i].name << ": " << *felt << "\n";
+    for (const std::string& note :
+         session::effect_notes(protocol.stimuli[i].object, library.texture(i), protocol.servo_rate))
+      out << "  note        stimulus " << protocol.stimuli[i].name << ": " << note << "\n";
   }
   if (!protocol.groups.any()) print_fitness(protocol, library, measured, out);
   for (std::size_t i = 0; i < protocol.group_protocols.size(); ++i) {

@@ -14,6 +14,7 @@
 #include "stimuli/primitives.h"
 #include "stimuli/shapes.h"
 #include "stimuli/solids/solid_mesh.h"
+#include "stimuli/texture.h"
 
 namespace palpate::runner::display {
 namespace {
@@ -38,6 +39,7 @@ void add(const stimuli::PolygonSoup& soup, const Pose& pose, DrawnMesh& out) {
 }
 
 void add_object(const stimuli::ObjectSpec& spec, const Pose& pose, DrawnMesh& out) {
+  if (spec.shape == stimuli::ShapeKind::none) return;
   if (spec.shape == stimuli::ShapeKind::compound) {
     for (const stimuli::ObjectSpec& part : spec.parts)
       add_object(part, stimuli::compose(pose, part.pose), out);
@@ -69,6 +71,51 @@ DrawnMesh surface_mesh(std::span<const Vec3> places,
     }
   }
   smooth(out);
+  return out;
+}
+
+DrawnMesh with_texture(const DrawnMesh& mesh, const stimuli::Texture& texture) {
+  constexpr double kMostTriangles = 5e5, kOfPeriod = 0.125;
+  double area = 0;
+  for (std::size_t i = 0; i + 2 < mesh.size(); i += 3) {
+    const glm::vec3 &a = mesh[i].position, &b = mesh[i + 1].position, &c = mesh[i + 2].position;
+    area += 0.5 * glm::length(glm::cross(b - a, c - a));
+  }
+  const double edge = std::max(kOfPeriod * texture.period(), std::sqrt(2 * area / kMostTriangles));
+  DrawnMesh out;
+  const auto corner = [&](const DrawnVertex& a, const DrawnVertex& b, const DrawnVertex& c, float u,
+                          float v) {
+    const float w = 1 - u - v;
+    DrawnVertex at{w * a.position + u * b.position + v * c.position,
+                   glm::normalize(w * a.normal + u * b.normal + v * c.normal),
+                   w * a.tint + u * b.tint + v * c.tint};
+    const Vec3 n(at.normal);
+    const Vec3 aside = std::abs(n.x) < 0.6 ? Vec3(1, 0, 0) : Vec3(0, 1, 0);
+    const Vec3 first = glm::normalize(glm::cross(n, aside)), second = glm::cross(n, first);
+    const stimuli::PlaneHeight h = texture.mean_height(Vec3(at.position), Vec3(0), first, second);
+    at.normal = glm::vec3(glm::normalize(n - h.slope[0] * first - h.slope[1] * second));
+    return at;
+  };
+  for (std::size_t i = 0; i + 2 < mesh.size(); i += 3) {
+    const DrawnVertex &a = mesh[i], &b = mesh[i + 1], &c = mesh[i + 2];
+    const double longest =
+        std::max({glm::distance(a.position, b.position), glm::distance(b.position, c.position),
+                  glm::distance(c.position, a.position)});
+    const int cuts = std::max(1, static_cast<int>(std::ceil(longest / edge)));
+    const auto at = [&](int j, int k) {
+      return corner(a, b, c, static_cast<float>(j) / static_cast<float>(cuts),
+                    static_cast<float>(k) / static_cast<float>(cuts));
+    };
+    for (int j = 0; j < cuts; ++j) {
+      for (int k = 0; j + k < cuts; ++k) {
+        for (const auto& [u, v] : {std::pair(j, k), {j + 1, k}, {j, k + 1}})
+          out.push_back(at(u, v));
+        if (j + k + 1 >= cuts) continue;
+        for (const auto& [u, v] : {std::pair(j + 1, k), {j + 1, k + 1}, {j, k + 1}})
+          out.push_back(at(u, v));
+      }
+    }
+  }
   return out;
 }
 

@@ -26,6 +26,10 @@ using DrawnMesh = std::vector<DrawnVertex>;  ///< three corners a triangle
 /// not a mesh
 DrawnMesh triangles_of(const stimuli::ObjectSpec& object);
 
+/// The same triangles, cut finely enough to show a texture by the normals of its surface; their
+/// places stay. At most half a million triangles: finer textures are drawn coarsely.
+DrawnMesh with_texture(const DrawnMesh& mesh, const stimuli::Texture& texture);
+
 /// A surface of triangles. \param tints  one for each place; empty: none
 DrawnMesh surface_mesh(std::span<const Vec3> places,
                        std::span<const std::array<std::uint32_t, 3>> triangles,

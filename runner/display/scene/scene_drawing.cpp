@@ -13,6 +13,7 @@
 #include "rendering/tool.h"
 #include "runner/display/scene/picture.h"
 #include "stimuli/shapes.h"
+#include "stimuli/texture.h"
 
 namespace palpate::runner::display {
 namespace {
@@ -98,6 +99,8 @@ const char* name_of(stimuli::ShapeKind kind) {
       return "compound";
     case stimuli::ShapeKind::mesh:
       return "mesh";
+    case stimuli::ShapeKind::none:
+      return "fields";
   }
   return "";
 }
@@ -279,10 +282,16 @@ Vec3 torque_on_hand(const SceneMoment& moment) {
 SceneDrawing::SceneDrawing(const std::vector<stimuli::ObjectSpec>& objects, rendering::Tool tool)
     : tool_(std::move(tool)) {
   for (std::size_t i = 0; i < objects.size(); ++i) {
-    Object object{.mesh = std::make_shared<const DrawnMesh>(triangles_of(objects[i])),
+    DrawnMesh mesh = triangles_of(objects[i]);
+    std::string label = std::to_string(i) + " " + name_of(objects[i].shape);
+    if (const auto& texture = objects[i].texture; texture && texture->depth > 0) {
+      label += ", " + stimuli::in_words(*texture);
+      mesh = with_texture(mesh, stimuli::Texture(*texture, objects[i].radius));
+    }
+    Object object{.mesh = std::make_shared<const DrawnMesh>(std::move(mesh)),
                   .pose = objects[i].pose,
                   .colour = kObjectColours[i % kObjectColours.size()],
-                  .label = std::to_string(i) + " " + name_of(objects[i].shape),
+                  .label = std::move(label),
                   .layers = {},
                   .felt = objects[i].material.stiffness > 0};
     for (const DrawnVertex& corner : *object.mesh)

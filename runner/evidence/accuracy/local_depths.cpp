@@ -307,6 +307,7 @@ double outside_by(const stimuli::ObjectSpec& s, const Vec3& p) {
       return std::max(side.x * out + side.z * (p.z - s.height / 2), -p.z - s.height / 2);
     }
     case stimuli::ShapeKind::mesh:
+    case stimuli::ShapeKind::none:
     case stimuli::ShapeKind::compound:
       break;
   }
@@ -397,6 +398,7 @@ double support(const stimuli::ObjectSpec& primitive, const Vec3& n) {
     case stimuli::ShapeKind::cone:
       return std::max(up, out - up);
     case stimuli::ShapeKind::mesh:
+    case stimuli::ShapeKind::none:
     case stimuli::ShapeKind::compound:
       break;
   }
@@ -428,6 +430,7 @@ std::vector<LocalDepth> local_depths(const stimuli::ObjectSpec& primitive,
       depths::depths_in_cone(collector);
       break;
     case stimuli::ShapeKind::mesh:
+    case stimuli::ShapeKind::none:
     case stimuli::ShapeKind::compound:
       break;  // refused above
   }

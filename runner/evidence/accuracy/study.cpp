@@ -135,6 +135,7 @@ int triangles_of(const stimuli::ObjectSpec& spec) {
     case stimuli::ShapeKind::box:
       return 12;
     case stimuli::ShapeKind::mesh:
+    case stimuli::ShapeKind::none:
     case stimuli::ShapeKind::compound:
       break;
   }

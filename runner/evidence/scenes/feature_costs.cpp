@@ -153,6 +153,16 @@ std::vector<FeatureTime> feature_times(const std::string& name, const SceneSpec&
     each(other.objects, [](ObjectSpec& one) { one.material.layers.clear(); });
     compare("layers", "the same without layers", std::move(other));
   }
+  if (any(spec.objects, [](const ObjectSpec& one) { return one.texture.has_value(); })) {
+    SceneSpec other = spec;
+    each(other.objects, [](ObjectSpec& one) { one.texture.reset(); });
+    compare("texture", "the same, all smooth", std::move(other));
+  }
+  if (any(spec.objects, [](const ObjectSpec& one) { return !one.fields.empty(); })) {
+    SceneSpec other = spec;
+    each(other.objects, [](ObjectSpec& one) { one.fields.clear(); });
+    compare("fields", "the same without fields", std::move(other));
+  }
   if (any(spec.objects, [](const ObjectSpec& one) { return one.body.has_value(); })) {
     SceneSpec other = spec;
     each(other.objects, [](ObjectSpec& one) { one.body.reset(); });

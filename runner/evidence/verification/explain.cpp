@@ -409,6 +409,23 @@ std::vector<TickStage> explain(const rendering::Scene& scene, const rendering::R
                       "one ideal tool for each, off the patches of its triangles and edges"});
   stages.push_back({"spring", StageTime::contact, true, "stiffness times depth along the normal"});
   add_materials(scene.features(), stages);
+  if (scene.features().texture)
+    stages.push_back({"texture", StageTime::contact, true,
+                      "a god-object on the carved profile, local to the facet"});
+  if (const rendering::SceneEffects* const effects = scene.effects()) {
+    std::size_t fields = 0;
+    bool knocks = false;
+    for (const rendering::ObjectEffects& object : effects->objects) {
+      fields += object.fields.size();
+      knocks = knocks || object.transient;
+    }
+    if (fields > 0)
+      stages.push_back({"fields", StageTime::tick, true,
+                        counted(fields, "field", "fields") + " at the tip or the grip"});
+    if (knocks)
+      stages.push_back(
+          {"knock of a contact", StageTime::contact, true, "a decaying sinusoid along the normal"});
+  }
   stages.push_back({"torque and second device", StageTime::contact, sides,
                     sides ? "the moment about the tip; equations (1), (4) and (5)"
                           : "a force at the tip has no moment about it"});

@@ -101,7 +101,8 @@ TEST(LevelName, IsTheNumbersNameWithoutItsUnit) {
   EXPECT_EQ(level_name("/size_m/0"), "size");
   EXPECT_EQ(level_name("/layers/1/break_n"), "break");
   EXPECT_EQ(level_name("/friction"), "friction");
-  EXPECT_EQ(level_name("/contact_transient/decay_per_s"), "decay per s");
+  EXPECT_EQ(level_name("/body/damping_per_s"), "damping");
+  EXPECT_EQ(level_name("/contact_transient/frequency_hz"), "frequency");
 }
 
 }  // namespace
