@@ -19,6 +19,7 @@
 #include "runner/evidence/reports/stability_report.h"
 #include "runner/evidence/reports/stability_study.h"
 #include "runner/evidence/stability/boundary.h"
+#include "runner/evidence/stability/effect_stability.h"
 #include "runner/output/outputs.h"
 #include "runner/output/progress_line.h"
 #include "runner/touch/forces.h"
@@ -95,6 +96,7 @@ int stability_command(const std::vector<std::string>& args) {
       "palpate stability SCENE.json [--renderer point|ray] [--device NAME [--calibration FILE]]\n"
       "                 [--report FILE.html] [--figure FILE.svg] [--json FILE]\n"
       "       palpate stability [--full] [--report FILE.html] [--json FILE]\n"
+      "       palpate stability --effects\n"
       "       palpate stability --soft [--seed S] [--figure FILE.svg]";
   line.summary =
       "At what stiffness does a contact become unstable (buzz)? Simulates the closed loop of\n"
@@ -103,6 +105,7 @@ int stability_command(const std::vector<std::string>& args) {
       "the passivity condition of theory. With a scene: the damping that each of its places of\n"
       "contact needs at 100 Hz to 10 kHz and delays of 0 to 3 ticks, and whether it buzzes on a\n"
       "device.\n"
+      "Textures, fields and knocks follow; --effects gives them alone.\n"
       "Status 1 if theory is violated. With --soft: does a tool come to rest on a soft body\n"
       "that is stepped at its own rate? Status 1 if it does not although scenes allow it.";
   line.example =
@@ -124,6 +127,7 @@ int stability_command(const std::vector<std::string>& args) {
       "with --device: with the delay that `palpate devices --timing` stored beside it");
   add("full", "four stiffnesses a decade instead of one");
   add("soft", "only the map of soft bodies: moduli, springs, rates of the body (a minute)");
+  add("effects", "only textures, fields and knocks (some seconds)");
   add("seed", po::value(&seed)->value_name("S"),
       "with --soft: other places, depths and speeds, drawn with this seed");
   add("report", po::value(&page)->value_name("FILE"),
@@ -141,7 +145,7 @@ int stability_command(const std::vector<std::string>& args) {
   output::Outputs outputs(*values, {"json", "report", "figure"}, {"scene", "calibration"});
   if (jobs == 0) jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   if (values->count("scene")) {
-    for (const char* const other : {"full", "soft", "seed"}) {
+    for (const char* const other : {"full", "soft", "seed", "effects"}) {
       if (values->count(other) > 0)
         throw UsageError(std::string("--") + other + ": does not go with a scene");
     }
@@ -177,17 +181,36 @@ int stability_command(const std::vector<std::string>& args) {
     return std::ranges::all_of(map, is_good) ? 0 : 1;
   }
   if (values->count("seed") > 0) throw UsageError("--seed: expected with --soft");
+  const std::vector<evidence::EffectStability> effects = evidence::effect_stability();
+  const bool effects_hold =
+      std::ranges::all_of(effects, [](const auto& one) { return one.holds(); });
+  if (values->count("effects") > 0) {
+    for (const char* const other : {"full", "report", "json", "figure"}) {
+      if (values->count(other) > 0)
+        throw UsageError(std::string("--effects: expected without --") + other);
+    }
+    progress.reset();
+    std::cout << evidence::effect_stability_text(effects);
+    return effects_hold ? 0 : 1;
+  }
   const evidence::StabilityReport report =
       evidence::stability_study(values->count("full") > 0, work);
   progress.reset();
-  if (outputs.wanted("json")) outputs.put("json", evidence::stability_json(report).dump(1) + "\n");
+  if (outputs.wanted("json")) {
+    auto all = evidence::stability_json(report);
+    for (const evidence::EffectStability& one : effects)
+      all["effects"].push_back({{"case", one.what},
+                                {"measured_ns_per_m", one.measured},
+                                {"theory_ns_per_m", one.theory}});
+    outputs.put("json", all.dump(1) + "\n");
+  }
   if (outputs.wanted("figure"))
     outputs.put("figure", analysis::figure_svg(evidence::stability_figure(report),
                                                analysis::light_palette()));
   if (outputs.wanted("report")) outputs.put("report", evidence::stability_page(report));
   outputs.write();
-  std::cout << evidence::stability_text(report);
-  return report.unsafe() == 0 && report.worst_disagreement() <= 0.05 ? 0 : 1;
+  std::cout << evidence::stability_text(report) << evidence::effect_stability_text(effects);
+  return effects_hold && report.unsafe() == 0 && report.worst_disagreement() <= 0.05 ? 0 : 1;
 }
 
 }  // namespace palpate::runner::commands
