@@ -594,9 +594,81 @@ void measure_soft_costs(TickTimer& timer, std::size_t ticks, double empty_ns,
   }
 }
 
+inline constexpr std::size_t kEffectCosts = 10;  ///< rows
+
+/// The tip slides to and fro over a plate, 0.6 to 1 mm deep, at 0.1 m/s; the stylus leans by 30
+/// degrees.
+TickCost time_plate(TickTimer& timer, const rendering::Renderer& renderer,
+                    const rendering::Scene& scene, std::size_t ticks) {
+  constexpr double kTop = 0.01, kReach = 0.02;    // m
+  constexpr double kCycle = 4 * kReach / kSpeed;  // s, to and fro
+  rendering::RenderState state = scene.initial_state();
+  const Vec3 axis = glm::normalize(Vec3(0.5, 0.1, 0.87));
+  const auto probe = [&](std::size_t i) {
+    const double time = static_cast<double>(i) * TickTimer::kTick;
+    const double share = time / kCycle - std::floor(time / kCycle);
+    const double x = kReach * (std::abs(4 * share - 2) - 1);
+    const double depth = 0.0008 + 0.0002 * std::sin(2 * std::numbers::pi * time / 0.7);
+    const Vec3 tip(x, 0.3 * x, kTop - depth);
+    return rendering::LineProbe{tip, tip + kLength * axis};
+  };
+  const rendering::LineProbe first = probe(0);
+  const Vec3 above(0, 0, 0.01);
+  renderer.tick(scene, state, {first.tip + above, first.tail + above}, TickTimer::kTick);
+  for (std::size_t i = 0; i < kWarm; ++i) renderer.tick(scene, state, probe(i), TickTimer::kTick);
+  for (std::size_t i = 0; i < ticks; ++i)
+    timer.tick(renderer, scene, state, probe(kWarm + i), true);
+  return timer.take();
+}
+
+/// A smooth plate, and the same with a texture by a formula, one by a table, a field and a knock.
+/// The targets are what they may cost beside the smooth one.
+void measure_effect_costs(TickTimer& timer, std::size_t ticks,
+                          const std::function<void(TickCost)>& keep) {
+  stimuli::ObjectSpec plate;
+  plate.shape = stimuli::ShapeKind::box;
+  plate.size = {0.1, 0.1, 0.02};
+  struct Row {
+    const char* name;
+    double more;  ///< ns
+    stimuli::ObjectSpec object;
+  };
+  std::array<Row, kEffectCosts / 2> rows{{{"plate", 0, plate},
+                                          {"plate, sine", 60, plate},
+                                          {"plate, noise", 100, plate},
+                                          {"plate, curl field", 15, plate},
+                                          {"plate, knock", 15, plate}}};
+  rows[1].object.texture = {.period = 0.002, .depth = 0.0003};
+  rows[2].object.texture = {
+      .kind = stimuli::TextureSpec::Kind::noise, .period = 0.002, .depth = 0.0002};
+  stimuli::FieldSpec curl;
+  curl.kind = stimuli::FieldSpec::Kind::curl;
+  curl.damping = Mat3(10);
+  rows[3].object.fields = {curl};
+  rows[4].object.transient.emplace();
+  for (const rendering::Renderer* renderer :
+       {&rendering::point_renderer(), &rendering::ray_renderer()}) {
+    double smooth = 0;
+    for (const Row& row : rows) {
+      SceneBuilder builder;
+      const rendering::Scene scene = builder.build({row.object}, renderer->side_contact());
+      TickCost cost =
+          least_disturbed([&] { return time_plate(timer, *renderer, scene, ticks / kTickRounds); });
+      if (row.more == 0) smooth = cost.net_ns();
+      cost.mesh = row.name;
+      cost.triangles = 12;
+      cost.renderer = renderer->name();
+      cost.state = "contact";
+      cost.target_ns = row.more == 0 ? kContactTarget : smooth + row.more;
+      keep(std::move(cost));
+    }
+  }
+}
+
 /// A path at 0.1 m/s over icospheres of 30 mm radius (20 to 327,680 triangles), the paper's other
 /// three shapes, one of 1,000 spheres, concave balls (1,280 to 1,310,720 triangles), and
-/// objects of ten near spheres with a tool of three segments. Penetration depth 1 to 2 mm; the
+/// objects of ten near spheres with a tool of three segments, and plates with textures, fields and
+/// knocks. Penetration depth 1 to 2 mm; the
 /// ray's contact moves between the tip and the side. 1,000 ticks precede each row, except for first
 /// contacts, which start a new trial 10 mm away, from a random direction. Each row warm, and cold:
 /// fewer ticks, and before each the near caches are cleared. \param done  called after each
@@ -617,7 +689,7 @@ std::vector<TickCost> measure_tick_costs(
         cost.target_ns = target_of(bench, renderer->side_contact(), state, cost.cold);
         cost.target_is_p99 = bench.is_surface && cost.state != "first_contact" && !cost.cold;
         rows.push_back(std::move(cost));
-        if (done) done(rows.size(), 12 * all.size() + kUnionCosts + kSoftCosts);
+        if (done) done(rows.size(), 12 * all.size() + kUnionCosts + kSoftCosts + kEffectCosts);
       };
       for (const bool cold : {false, true}) {
         timer.set_cold(cold);
@@ -638,12 +710,16 @@ std::vector<TickCost> measure_tick_costs(
   }
   measure_union_costs(timer, settings.ticks, [&](TickCost cost) {
     rows.push_back(std::move(cost));
-    if (done) done(rows.size(), 12 * all.size() + kUnionCosts + kSoftCosts);
+    if (done) done(rows.size(), 12 * all.size() + kUnionCosts + kSoftCosts + kEffectCosts);
+  });
+  measure_effect_costs(timer, settings.ticks, [&](TickCost cost) {
+    rows.push_back(std::move(cost));
+    if (done) done(rows.size(), 12 * all.size() + kUnionCosts + kSoftCosts + kEffectCosts);
   });
   const double empty_ns = rows.front().empty_loop_ns;
   measure_soft_costs(timer, settings.ticks, empty_ns, [&](TickCost cost) {
     rows.push_back(std::move(cost));
-    if (done) done(rows.size(), 12 * all.size() + kUnionCosts + kSoftCosts);
+    if (done) done(rows.size(), 12 * all.size() + kUnionCosts + kSoftCosts + kEffectCosts);
   });
   return rows;
 }
