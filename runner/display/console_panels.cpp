@@ -12,6 +12,7 @@
 #include "runner/display/console_elements.h"
 #include "runner/display/console_words.h"
 #include "runner/safety/fault_signals.h"
+#include "stimuli/texture.h"
 
 namespace palpate::runner::display {
 namespace {
@@ -322,6 +323,9 @@ void draw_status(const ConsoleState& state, bool hidden, bool compact) {
   table_row("Trial", trial_of(state) + (practice ? "  PRACTICE" : ""), practice ? kGood : kBright);
   table_row("Block", of(state.block, state.blocks));
   table_row("Stimulus", state.shape.empty() ? "-" : hidden ? "hidden" : state.shape);
+  const bool placed = state.objects != nullptr && !state.objects->empty();
+  if (placed && state.objects->front().texture && !hidden)
+    table_row("Texture", stimuli::in_words(*state.objects->front().texture));
   table_row("Renderer", state.renderer.empty() ? "-" : state.renderer);
   if (!state.task.empty()) {
     table_row("Task", state.task + ", interval " + of(state.interval, state.intervals));

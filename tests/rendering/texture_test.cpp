@@ -221,6 +221,74 @@ TEST(TexturedContact, TwoDimensionalKindsMakeNoEnergy) {
   }
 }
 
+/// J round a closed path of poses of the stylus, tip and direction, over the path's force times
+/// way. \param pose  of a share of the path, 0 to 1
+template <class PoseAt>
+Work round_poses(Plate& felt, const PoseAt& pose, int steps) {
+  Work sum;
+  Vec3 last_tip, last_d, last_force, last_torque;
+  for (int i = 0; i <= 2 * steps; ++i) {
+    const auto [tip, d] = pose(static_cast<double>(i % steps) / steps);
+    const Rendering now = felt.tick(tip, tip + d);
+    if (i > steps) {
+      const Vec3 force = 0.5 * (now.force + last_force), torque = 0.5 * (now.torque + last_torque);
+      const Vec3 turn = glm::cross(0.5 * (d + last_d), d - last_d) / (kLength * kLength);
+      sum.work += glm::dot(force, tip - last_tip) + glm::dot(torque, turn);
+      sum.way += glm::length(force) * glm::length(tip - last_tip) +
+                 glm::length(torque) * glm::length(turn);
+    }
+    last_tip = tip;
+    last_d = d;
+    last_force = now.force;
+    last_torque = now.torque;
+  }
+  return sum;
+}
+
+TEST(TexturedContact, TurningStylusMakesNoEnergyOnAFace) {
+  Random random(21);
+  Plate felt(sine(), ray_renderer());
+  for (int loop = 0; loop < 6; ++loop) {
+    const double a = random.normal(), b = random.normal(), c = random.normal();
+    const Work sum = round_poses(
+        felt,
+        [&](double s) {
+          const double angle = 2 * std::numbers::pi * s;
+          const Vec3 d = kLength * glm::normalize(Vec3(0.3 + 0.02 * a * std::sin(angle),
+                                                       0.2 + 0.02 * b * std::cos(angle), 0.9));
+          return std::pair(Vec3(0.001 * std::cos(angle) + 0.0007 * c, 0.002 * std::sin(angle),
+                                kTop - 0.0007 + 0.0001 * std::sin(2 * angle)),
+                           d);
+        },
+        20'000);
+    EXPECT_LE(sum.work, 1e-6 * sum.way);
+  }
+}
+
+TEST(TexturedContact, TurningStylusMakesLittleEnergyOnAnEdge) {
+  // The place on the edge depends on the depth when the stylus turns.
+  Random random(22);
+  Plate felt(sine(), ray_renderer());
+  double most = 0;
+  for (int loop = 0; loop < 6; ++loop) {
+    const double a = random.normal(), b = random.normal();
+    const Work sum = round_poses(
+        felt,
+        [&](double s) {
+          const double angle = 2 * std::numbers::pi * s;
+          const Vec3 d = kLength * glm::normalize(Vec3(0.01 * a * std::sin(angle),
+                                                       1 + 0.01 * b * std::cos(angle), -1));
+          const Vec3 n = glm::normalize(Vec3(0, 1, 1));
+          const Vec3 on(0.0005 * std::sin(angle + 0.7), 0.05, kTop);
+          return std::pair(on - (0.00035 + 0.00005 * std::cos(2 * angle)) * n - 0.5 * d, d);
+        },
+        20'000);
+    most = std::max(most, std::abs(sum.work) / sum.way);
+  }
+  EXPECT_LE(most, 5e-4);
+  EXPECT_GT(most, 0);
+}
+
 TEST(TexturedContact, AlongTheRidgesNothingIsFelt) {
   Plate felt(sine());
   const Rendering here = felt.upright({0.0004, -0.02}, 0.0006);
