@@ -182,12 +182,13 @@ std::vector<EffectStability> effect_stability() {
 
 std::string effect_stability_text(const std::vector<EffectStability>& rows) {
   std::string out =
-      "Textures, fields and knocks: a mass at 1 kHz, released; the least damping that is stable\n"
-      "  case                                  measured  theory, N s/m\n";
+      "Textures, fields and knocks: a mass at 1 kHz, released; the least damping that is stable\n";
+  char line[120];
+  std::snprintf(line, sizeof line, "  %-38s%10s%16s\n", "case", "measured", "theory, N s/m");
+  out += line;
   std::size_t held = 0;
   for (const EffectStability& row : rows) {
-    char line[120];
-    std::snprintf(line, sizeof line, "  %-38s%8.3f%8.3f%s\n", row.what.c_str(), row.measured,
+    std::snprintf(line, sizeof line, "  %-38s%10.3f%16.3f%s\n", row.what.c_str(), row.measured,
                   row.theory, row.holds() ? "" : "  above theory");
     out += line;
     held += row.holds();

@@ -149,6 +149,16 @@ class Stability(unittest.TestCase):
                 if worst:
                     self.assertAlmostEqual(max(worst), float(cell), delta=0.01 + 0.01 * max(worst))
 
+    def test_textures_and_fields_are_stable_where_theory_promises_it(self):
+        said = self.stability("--effects").stdout
+        rows = [line for line in said.splitlines() if re.match("  (sine|viscous|curl|knock)", line)]
+        self.assertEqual(len(rows), 20)
+        for row in rows:
+            measured, theory = map(float, row.split()[-2:])
+            self.assertLessEqual(measured, 1.02 * theory, row)
+        self.assertIn("20 of 20", said)
+        self.stability("--effects", "--full", status=2)
+
     def test_wrong_usage_is_refused(self):
         kept = self.dir / "kept.json"
         kept.write_text("mine")
