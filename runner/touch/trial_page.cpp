@@ -331,7 +331,7 @@ class PageBuilder {
                    {"label", "interval " + std::to_string(i + 1) + ": " + label + ", " +
                                  renderer_words(intervals[i].renderer, other)},
                    {"mesh", nullptr}};
-      if (objects[i]) {
+      if (objects[i] && objects[i]->shape != stimuli::ShapeKind::none) {
         part["mesh"] = add_mesh(*objects[i], label);
         part["pose"] = pose_json(objects[i]->pose);
       }
