@@ -223,6 +223,13 @@ void study_users_scene(const po::variables_map& values, output::Outputs& outputs
   evidence::StudiedScene scene;
   scene.name = std::filesystem::path(path).filename().string();
   scene.spec = protocols::parse_scene(path);
+  const auto surfaceless =
+      std::ranges::find(scene.spec.objects, stimuli::ShapeKind::none, &stimuli::ObjectSpec::shape);
+  if (surfaceless != scene.spec.objects.end())
+    throw UsageError(path + ": /objects/" +
+                     std::to_string(surfaceless - scene.spec.objects.begin()) +
+                     "/shape: expected an object with a surface: the methods differ in contacts, "
+                     "not in fields");
   for (const stimuli::ObjectSpec& object : scene.spec.objects) outputs.protect(object);
   if (values.count("trajectory"))
     scene.paths = {touch::read_trajectory(values["trajectory"].as<std::string>())};

@@ -146,6 +146,12 @@ class Accuracy(CommandCase):
         xml.etree.ElementTree.parse(figure)
         self.assertIn("law: this program", page.read_text())
 
+    def test_fields_alone_have_no_contact_to_compare(self):
+        fields = {"shape": "none", "fields": [{"kind": "constant", "force_n": [0, 0, 1]}]}
+        scene = self.file("fields.json", {"objects": [*CUBE["objects"], fields]})
+        said = self.palpate("accuracy", scene, status=2).stderr
+        self.assertIn("/objects/1/shape: expected an object with a surface", said)
+
     def test_options_that_do_not_go_together_are_refused(self):
         scene = self.file("cube.json", CUBE)
         self.assertIn("--search", self.palpate("accuracy", scene, "--search", 100, status=2).stderr)
