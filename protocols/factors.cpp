@@ -1,7 +1,6 @@
 #include "protocols/factors.h"
 
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <map>
 #include <nlohmann/json.hpp>
@@ -13,6 +12,7 @@
 #include <vector>
 
 #include "data/base/cell_name.h"
+#include "data/base/column_names.h"
 #include "data/base/json_text.h"
 #include "protocols/tasks/parse_blocks.h"
 
@@ -27,13 +27,6 @@ constexpr std::size_t kMostCells = 64;
 constexpr std::size_t kMostSets = 100;
 constexpr const char* kOfStimuli = "/stimuli/";
 constexpr const char* kOfBlock = "/block/";
-
-/// Columns of tables, and words of results, that a factor would be taken for.
-constexpr std::array kTaken = {
-    "group",    "session",     "block",   "trial",     "attempt",  "renderer", "shape",
-    "stimulus", "practice",    "device",  "simulated", "task",     "track",    "level",
-    "number",   "confidence",  "success", "correct",   "response", "onset",    "duration",
-    "tick",     "participant", "events",  "faults",    "run",      "observer"};
 
 /// A part of what a level sets: of the stimuli, or of the block.
 struct Target {
@@ -91,12 +84,10 @@ void read_level_sets(ObjectReader& reader, FactorLevel& level) {
   }
 }
 
-bool is_taken(const std::string& name) { return std::ranges::find(kTaken, name) != kTaken.end(); }
-
 void read_factor_name(ObjectReader& item, std::set<std::string>& names, std::string& name) {
   item.name("name", name);
   if (name.empty()) return;
-  if (is_taken(name))
+  if (is_column_name(name))
     item.faults().add(item.pointer("name"),
                       "expected another name: tables have a column '" + name + "' already");
   if (!names.insert(name).second)
@@ -226,6 +217,7 @@ class Cells {
   /// The block's own keys as a cell sets them.
   TaskBlock block_in_cell(const TaskBlock& plain, std::size_t cell);
   void check_sets(const TaskBlock& block);
+  void check_uses();
   bool set(json& value, const std::string& rest, const std::string& text, const std::string& place,
            const std::string& of);
 
@@ -380,7 +372,10 @@ void Cells::check_sets(const TaskBlock& block) {
                               "': a block's own keys cannot change from trial to trial");
     for (const char* const key :
          {"/stimuli", "/standard", "/factors", "/mixing", "/task", "/session", "/practice",
-          "/absent", "/level", "/keys", "/procedure", "/renderers"}) {
+          "/absent", "/level", "/keys", "/procedure", "/renderers",
+          // What an answer means: cells are compared.
+          "/asks", "/answer", "/intervals", "/scale", "/min", "/max", "/modulus", "/answers",
+          "/catch_trials", "/order", "/repetitions"}) {
       if (target.stimulus.empty() && one_holds_the_other(target.rest, key))
         tell(sets[i].place,
              std::string("expected another key: all cells share '") + (key + 1) + "'");
@@ -398,8 +393,28 @@ void Cells::check_sets(const TaskBlock& block) {
   }
 }
 
+/// Refuses factors and sets without an effect.
+void Cells::check_uses() {
+  for (std::size_t f = 0; f < protocol_.factors.size(); ++f) {
+    const std::vector<FactorLevel>& levels = protocol_.factors[f].levels;
+    const std::string place = "/factors/" + std::to_string(f);
+    for (std::size_t k = 1; k < levels.size(); ++k) {
+      const auto same = std::ranges::find(levels, levels[k].sets, &FactorLevel::sets);
+      if (same < levels.begin() + static_cast<std::ptrdiff_t>(k))
+        faults_.add(place + "/levels/" + std::to_string(k) + "/set",
+                    "expected other sets than those of the level '" + same->name + "'");
+    }
+    const auto crosses = [&](const TaskBlock& block) {
+      return std::ranges::find(block.factors, f, &CrossedFactor::factor) != block.factors.end();
+    };
+    if (std::ranges::none_of(protocol_.blocks, crosses))
+      faults_.add(place, "expected a block that crosses it ('factors' of a block)");
+  }
+}
+
 void Cells::add_all() {
   for (const TaskBlock& block : protocol_.blocks) check_sets(block);
+  check_uses();
   if (!faults_.empty()) return;
   std::vector<TaskBlock> all;
   for (const TaskBlock& plain : std::exchange(protocol_.blocks, {})) {

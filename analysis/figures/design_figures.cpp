@@ -184,7 +184,8 @@ Figure begin_figure(const StudyAnalysis& analysis, const GroupedMeasure& measure
   for (const std::string* const name : {&measure.block_name, &measure.shape}) {
     if (!name->empty()) figure.title += ", " + printable(*name);
   }
-  figure.subtitle = counted(measure.figures.size(), "participant", "participants");
+  figure.subtitle = counted(measure.figures.size() - measure.result.dropped.size(), "participant",
+                            "participants");
   if (analysis.table.simulated) figure.label = "SIMULATED PARTICIPANTS";
   figure.notes.emplace_back(
       "Large symbols: means over participants with their 95 % intervals (t), geometric if all "

@@ -10,6 +10,7 @@
 #include "analysis/figures/panel_drawing.h"
 #include "analysis/statistics/task_analysis.h"
 #include "analysis/text.h"
+#include "data/base/cell_name.h"
 
 namespace palpate::analysis {
 namespace {
@@ -409,12 +410,26 @@ void add_ratings(Panel& panel, const TaskCell& cell, const std::vector<RatedPlac
 }
 
 /// Means of all stimuli of a block side by side.
+/// "silk", "smooth, large" of the cells of one stimulus, "silk: smooth, large" of several.
+std::string place_label(const std::string& shape, const std::vector<std::string>& shapes) {
+  const CellName name = cell_name(shape);
+  if (name.levels.empty()) return printable(name.base);
+  std::string levels;
+  for (const auto& [factor, level] : name.levels)
+    levels += (levels.empty() ? "" : ", ") + printable(level);
+  const bool one = std::ranges::all_of(
+      shapes, [&](const std::string& other) { return base_name(other) == name.base; });
+  return one ? levels : printable(name.base) + ": " + levels;
+}
+
 Panel named_ratings_panel(const CellList& cells) {
   const std::vector<std::string> shapes = distinct(cells, &TaskCell::shape);
   const std::vector<std::string> renderers = distinct(cells, &TaskCell::renderer);
+  std::vector<std::string> labels;
+  for (const std::string& shape : shapes) labels.push_back(place_label(shape, shapes));
   Panel panel;
   panel.title = "Mean ratings";
-  panel.x = names_axis(shapes, shapes.size(), "");
+  panel.x = names_axis(labels, labels.size(), "");
   panel.y = rating_axis(cells);
   panel.width = std::min(900.0, 80 + 70 * static_cast<double>(shapes.size()));
   panel.height = 260;
@@ -422,9 +437,10 @@ Panel named_ratings_panel(const CellList& cells) {
     const double r = place_of(renderers, cell->renderer);
     const double apart = 0.6 / static_cast<double>(renderers.size());
     const double x = place_of(shapes, cell->shape) + 0.2 + (r + 0.4) * apart;
-    add_ratings(panel, *cell,
-                {{x, printable(cell->shape), &cell->ratings->mean, &cell->ratings->participants}},
-                static_cast<std::size_t>(r), false);
+    add_ratings(
+        panel, *cell,
+        {{x, place_label(cell->shape, shapes), &cell->ratings->mean, &cell->ratings->participants}},
+        static_cast<std::size_t>(r), false);
   }
   return panel;
 }

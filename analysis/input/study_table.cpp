@@ -16,6 +16,7 @@
 #include "analysis/input/trials.h"
 #include "analysis/text.h"
 #include "data/base/cell_name.h"
+#include "data/base/column_names.h"
 #include "data/base/json_text.h"
 #include "data/base/text.h"
 #include "data/files/text_sink.h"
@@ -166,9 +167,17 @@ int intervals_of(const TaskRow& row) {
   return static_cast<int>(std::count(onsets.begin(), onsets.end(), ';')) + 1;
 }
 
-/// Columns of factors stand after `practice`: of a table with them, those that have no other
-/// meaning.
-std::vector<std::string> factor_columns(const Columns& columns) {
+/// The columns of factors: those that the protocols name, wherever they stand; without a protocol
+/// those after `practice` that have no other meaning.
+std::vector<std::string> factor_columns(const Columns& columns,
+                                        const std::vector<ProtocolText>& protocols) {
+  std::vector<std::string> named;
+  for (const ProtocolText& one : protocols) {
+    for (const data::StoredFactor& factor : data::read_stored_protocol(one.text).factors) {
+      if (columns.contains(factor.name)) note_once(factor.name, named);
+    }
+  }
+  if (!named.empty()) return named;
   const auto practice = columns.find("practice");
   if (practice == columns.end()) return {};
   std::map<std::size_t, std::string> after;
@@ -178,9 +187,28 @@ std::vector<std::string> factor_columns(const Columns& columns) {
   std::vector<std::string> out;
   for (const auto& [place, name] : after) {
     if (name == "timed_out" || name == "onset_utc") return out;
-    out.push_back(name);
+    if (!is_column_name(name)) out.push_back(name);
   }
   return {};
+}
+
+/// Tells of columns that may be factors, where none is known: trials of their levels are pooled.
+void warn_of_unread(const std::vector<std::string>& found, const std::vector<std::string>& factors,
+                    const std::vector<AlikeColumn>& alike, StudyTable& table) {
+  if (!factors.empty()) return;
+  std::vector<std::string> unread;
+  for (const std::string& name : found) {
+    if (!is_column_name(name) && std::ranges::find(alike, name, &AlikeColumn::found) == alike.end())
+      unread.push_back("'" + printable(name, 40) + "'");
+  }
+  constexpr std::size_t kMost = 10;
+  if (unread.empty()) return;
+  const std::size_t more = unread.size() - std::min(unread.size(), kMost);
+  unread.resize(std::min(unread.size(), kMost));
+  if (more > 0) unread.push_back(std::to_string(more) + " more");
+  table.warnings.push_back("Not read: " + joined(unread) +
+                           ". Columns of factors stand between practice and timed_out, or are "
+                           "named by the protocol (--design).");
 }
 
 StudyTrial read_trial(TaskRow& row, const std::vector<std::string>& factors) {
@@ -371,7 +399,7 @@ StudyTable read_tasks_csv(const std::string& path, const std::vector<std::string
   CsvReader reader(path);
   std::vector<std::string> found, twice;
   const Columns columns = read_header(reader, &twice);
-  const std::vector<std::string> factors = factor_columns(columns);
+  const std::vector<std::string> factors = factor_columns(columns, protocols);
   const std::size_t n_fields = reader.fields().size();
   faults.reserve(twice.size());
   for (const std::string& name : twice)
@@ -384,6 +412,7 @@ StudyTable read_tasks_csv(const std::string& path, const std::vector<std::string
           {path, "line 1", std::string("expected a column ") + needed + hint_for(needed, alike)});
   }
   for (const AlikeColumn& one : alike) table.warnings.push_back(sentence(one));
+  warn_of_unread(found, factors, alike, table);
   TorqueCounts torque;
   const bool numbered = columns.count("session") > 0 && columns.count("trial") > 0;
   std::map<std::tuple<std::string, std::pair<std::string, std::string>, int, int, int>, std::size_t>

@@ -8,6 +8,8 @@
 namespace palpate::analysis {
 
 inline constexpr double kNoVariance = 1e-10;  ///< relative to the mean, as for the paired tests
+/// Relative to the largest figure: fitted figures are no more exact, and no effect is as small.
+inline constexpr double kFigureNoise = 1e-7;
 
 /// Orthonormal Helmert contrasts of `levels`, one a row, each summing to 0.
 inline Eigen::MatrixXd helmert_contrasts(Eigen::Index levels) {

@@ -58,7 +58,7 @@ void adjust_contrasts(std::vector<GroupContrast>& contrasts, std::size_t first) 
 }
 
 /// One-sample t of the participants' differences.
-GroupContrast paired_contrast(const std::vector<double>& differences) {
+GroupContrast paired_contrast(const std::vector<double>& differences, double noise) {
   GroupContrast out;
   out.within = out.of_difference = true;
   out.n_reference = out.n = differences.size();
@@ -68,7 +68,7 @@ GroupContrast paired_contrast(const std::vector<double>& differences) {
     out.undefined = "fewer than two participants with a value in every cell";
     return out;
   }
-  if (*found.se <= kNoVariance * std::max(1.0, std::fabs(*found.mean))) {
+  if (*found.se <= std::max(noise, kNoVariance * std::max(1.0, std::fabs(*found.mean)))) {
     out.undefined = "all participants of a group are equal (no variance)";
     return out;
   }
@@ -82,7 +82,8 @@ GroupContrast paired_contrast(const std::vector<double>& differences) {
 
 }  // namespace
 
-GroupContrast welch(const std::vector<double>& reference, const std::vector<double>& other) {
+GroupContrast welch(const std::vector<double>& reference, const std::vector<double>& other,
+                    double noise) {
   GroupContrast out;
   out.n_reference = reference.size();
   out.n = other.size();
@@ -98,7 +99,8 @@ GroupContrast welch(const std::vector<double>& reference, const std::vector<doub
   }
   const auto m = static_cast<double>(reference.size()), n = static_cast<double>(other.size());
   const double va = *a * *a / m, vb = *b * *b / n;
-  if (std::sqrt(va + vb) <= kNoVariance * std::max(1.0, std::fabs(mean(reference)))) {
+  if (std::sqrt(va + vb) <=
+      std::max(noise, kNoVariance * std::max(1.0, std::fabs(mean(reference))))) {
     out.undefined = "all participants of a group are equal (no variance)";
     return out;
   }
@@ -144,6 +146,7 @@ BetweenGroups compare_groups(const std::vector<GroupedFigures>& figures, std::si
       out.dropped.push_back(i);
   }
   out.anova = mixed_anova(rows, groups, within);
+  const double noise = figure_noise(rows);
   std::vector<Compared> compared{{}}, differences;
   // Shapes are described by themselves: one table for each would hide the design.
   const std::size_t shown = contrasts == WithinContrasts::added ? within.size() : 1;
@@ -165,8 +168,8 @@ BetweenGroups compare_groups(const std::vector<GroupedFigures>& figures, std::si
   compared.insert(compared.end(), differences.begin(), differences.end());
   for (std::size_t group = 1; group < groups; ++group) {
     for (const Compared& one : compared) {
-      GroupContrast& made = out.contrasts.emplace_back(
-          welch(compared_values(rows, 0, one, within), compared_values(rows, group, one, within)));
+      GroupContrast& made = out.contrasts.emplace_back(welch(
+          compared_values(rows, 0, one, within), compared_values(rows, group, one, within), noise));
       made.group = group;
       made.condition = one.condition;
       made.of_difference = one.of_difference;
@@ -176,8 +179,8 @@ BetweenGroups compare_groups(const std::vector<GroupedFigures>& figures, std::si
   const std::size_t first = out.contrasts.size();
   for (std::size_t group = 0; contrasts == WithinContrasts::added && group < groups; ++group) {
     for (const Compared& one : differences) {
-      GroupContrast& made =
-          out.contrasts.emplace_back(paired_contrast(compared_values(rows, group, one, within)));
+      GroupContrast& made = out.contrasts.emplace_back(
+          paired_contrast(compared_values(rows, group, one, within), noise));
       made.group = group;
       made.condition = one.condition;
     }

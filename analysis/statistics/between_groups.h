@@ -64,8 +64,10 @@ BetweenGroups compare_groups(const std::vector<GroupedFigures>& figures, std::si
                              const std::vector<WithinFactor>& within,
                              WithinContrasts contrasts = WithinContrasts::left_out);
 
-/// Welch's t test: mean of `other` minus mean of `reference`.
-GroupContrast welch(const std::vector<double>& reference, const std::vector<double>& other);
+/// Welch's t test: mean of `other` minus mean of `reference`. \param noise  a standard error that
+/// is none
+GroupContrast welch(const std::vector<double>& reference, const std::vector<double>& other,
+                    double noise = 0);
 
 /// Mean of the cells with a level of a factor, the levels of the first factor outermost.
 double mean_of_condition(const std::vector<double>& cells, const std::vector<WithinFactor>& within,

@@ -63,8 +63,10 @@ GroupScores group_scores(const std::vector<GroupedRow>& rows, const VectorXd& n,
 }
 
 /// The hypothesis that these combinations of the group means are 0. \param between  one a row
+/// \param noise  a standard deviation that is none
 GroupEffect effect_of(std::string name, const GroupScores& scores, const VectorXd& n,
-                      double participants, const MatrixXd& between, double all_error) {
+                      double participants, const MatrixXd& between, double all_error,
+                      double noise) {
   GroupEffect out;
   out.name = std::move(name);
   const MatrixXd tested = between * scores.means;
@@ -75,7 +77,7 @@ GroupEffect effect_of(std::string name, const GroupScores& scores, const VectorX
   out.num_df = p * static_cast<double>(between.rows());
   out.den_df = error_df;
   const double error = scores.ss_error() / error_df;
-  if (std::sqrt(error) <= kNoVariance * std::max(1.0, scores.means.norm())) {
+  if (std::sqrt(error) <= std::max(noise, kNoVariance * std::max(1.0, scores.means.norm()))) {
     out.undefined = "the effect is equal in all participants of a group (no variance)";
     return out;
   }
@@ -96,6 +98,14 @@ GroupEffect effect_of(std::string name, const GroupScores& scores, const VectorX
 
 }  // namespace
 
+double figure_noise(const std::vector<GroupedRow>& rows) {
+  double largest = 0;
+  for (const GroupedRow& row : rows) {
+    for (const double value : row.values) largest = std::max(largest, std::fabs(value));
+  }
+  return kFigureNoise * largest;
+}
+
 MixedAnova mixed_anova(const std::vector<GroupedRow>& rows, std::size_t groups,
                        const std::vector<WithinFactor>& within) {
   MixedAnova out;
@@ -112,6 +122,7 @@ MixedAnova mixed_anova(const std::vector<GroupedRow>& rows, std::size_t groups,
   for (std::size_t i = 0; i < groups; ++i) n(static_cast<Index>(i)) = static_cast<double>(out.n[i]);
   std::vector<GroupScores> scores;
   double all_error = 0;
+  const double noise = figure_noise(rows);
   for (Subset subset = 0; subset < Subset{1} << within.size(); ++subset) {
     scores.push_back(group_scores(rows, n, contrasts_of(subset, within)));
     all_error += scores.back().ss_error();
@@ -122,7 +133,7 @@ MixedAnova mixed_anova(const std::vector<GroupedRow>& rows, std::size_t groups,
     const std::string name = name_of(subset, within);
     const auto add = [&](const std::string& effect, const MatrixXd& between) {
       out.effects.push_back(effect_of(effect, scores[subset], n, static_cast<double>(rows.size()),
-                                      between, all_error));
+                                      between, all_error, noise));
     };
     if (!name.empty()) add(name, unweighted);
     if (groups > 1) add(name.empty() ? "group" : "group:" + name, helmert_contrasts(n.size()));

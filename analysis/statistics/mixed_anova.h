@@ -44,6 +44,9 @@ struct MixedAnova {
   std::vector<GroupEffect> effects;  ///< "group", then each within effect and its product
 };
 
+/// A standard deviation of differences of these figures that is rounding alone.
+double figure_noise(const std::vector<GroupedRow>& rows);
+
 /// \param groups  number of groups; 1: no factor between participants
 MixedAnova mixed_anova(const std::vector<GroupedRow>& rows, std::size_t groups,
                        const std::vector<WithinFactor>& within);

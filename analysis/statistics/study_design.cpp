@@ -148,8 +148,8 @@ struct MeasureOfTask {
   std::vector<const TaskGroup*> cells;
 };
 
-/// A measure of a task, by renderer and factors; none: its cells are not crossed completely.
-std::optional<GroupedMeasure> task_by_design(const MeasureOfTask& task, const StudyTable& table) {
+/// A measure of a task, by renderer and factors.
+GroupedMeasure task_by_design(const MeasureOfTask& task, const StudyTable& table) {
   const TaskGroup& first = *task.cells.front();
   GroupedMeasure out;
   out.measure = first.measure;
@@ -171,8 +171,12 @@ std::optional<GroupedMeasure> task_by_design(const MeasureOfTask& task, const St
   std::vector<std::size_t> order{0};
   if (names.size() > 1) {
     const auto crossed = crossed_stimuli(names, table.factors);
-    if (!crossed) return std::nullopt;
     out.crossed = true;
+    if (!crossed) {
+      out.result.anova.undefined = "its " + std::to_string(names.size()) +
+                                   " cells do not cross the levels of its factors completely";
+      return out;
+    }
     out.within.insert(out.within.end(), crossed->factors.begin(), crossed->factors.end());
     order = crossed->cells;
   }
@@ -243,7 +247,7 @@ std::vector<GroupedMeasure> measures_by_design(const StudyAnalysis& analysis) {
     out.push_back(std::move(accuracy));
   }
   for (const MeasureOfTask& task : measures_of_tasks(analysis.groups)) {
-    if (auto measure = task_by_design(task, table)) out.push_back(std::move(*measure));
+    out.push_back(task_by_design(task, table));
   }
   if (table.group_labels.names.empty())
     std::erase_if(out, [](const GroupedMeasure& one) { return !one.crossed; });

@@ -19,7 +19,8 @@ std::int64_t difference(std::int64_t a, std::int64_t b) {
                : std::numeric_limits<std::int64_t>::max();
 }
 
-/// The factors of all protocols, each once, with the levels of all.
+/// The factors of all protocols, each once, with the levels of all; a level that protocols set in
+/// different ways has all of them.
 std::vector<StoredFactor> factors_of(Store& store) {
   std::vector<StoredFactor> out;
   for (const ProtocolInfo& protocol : store.protocols()) {
@@ -27,8 +28,12 @@ std::vector<StoredFactor> factors_of(Store& store) {
       auto known = std::ranges::find(out, factor.name, &StoredFactor::name);
       if (known == out.end()) known = out.insert(out.end(), {factor.name, {}});
       for (const auto& level : factor.levels) {
-        const auto same = [&](const auto& one) { return one.first == level.first; };
-        if (std::ranges::none_of(known->levels, same)) known->levels.push_back(level);
+        const auto same = std::ranges::find(known->levels, level.first,
+                                            &std::pair<std::string, std::string>::first);
+        if (same == known->levels.end())
+          known->levels.push_back(level);
+        else if ((", " + same->second + ",").find(", " + level.second + ",") == std::string::npos)
+          same->second += ", in another protocol " + level.second;
       }
     }
   }

@@ -47,28 +47,62 @@ int cells_of(const Protocol& protocol, int first) {
                           begin);
 }
 
+/// The rows of the squares that order blocks, and cells within them.
+struct SquareRows {
+  int blocks = 1, cells = 1;  ///< after which the orders of all sessions repeat
+
+  int of_both() const { return std::lcm(blocks, cells); }
+  /// The participant's number for the square of the cells of a block. Each time that the rows of
+  /// both repeat they are shifted, so that every order of cells meets every order of blocks.
+  /// \param crossed  blocks of cells before this one: they begin with other rows
+  int of_cells(int number, int crossed) const {
+    return number + crossed + (blocks > 1 ? (number - 1) / of_both() : 0);
+  }
+  int period() const { return blocks > 1 ? of_both() * cells : cells; }
+};
+
+SquareRows square_rows(const Protocol& protocol) {
+  SquareRows out;
+  std::map<int, int> blocks;  // by session
+  for (int i = 0; i < static_cast<int>(protocol.blocks.size());) {
+    const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(i)];
+    const int cells = cells_of(protocol, i);
+    out.cells = std::lcm(out.cells, latin_square_rows(cells));
+    if (!block.practice) ++blocks[block.session];
+    i += cells;
+  }
+  for (const auto& [session, count] : blocks) {
+    if (protocol.blocks_counterbalanced)
+      out.blocks = std::lcm(out.blocks, latin_square_rows(count));
+  }
+  return out;
+}
+
 }  // namespace
 
 std::vector<int> blocks_in_order(const Protocol& protocol, int participant_number, int session) {
   std::vector<std::vector<int>> units(1);  // each a block with the practice before it
+  const int number = protocol.groups.row(participant_number);
+  const SquareRows rows = square_rows(protocol);
+  int crossed = 0;  // blocks whose cells stand apart
   for (int i = 0; i < static_cast<int>(protocol.blocks.size());) {
     const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(i)];
     const int cells = cells_of(protocol, i);
     if (block.session == session) {
-      for (const int cell : latin_square_row(cells, protocol.groups.row(participant_number)))
+      for (const int cell : latin_square_row(cells, rows.of_cells(number, crossed)))
         units.back().push_back(i + cell);
       if (!block.practice) units.emplace_back();
     }
+    if (cells > 1) ++crossed;
     i += cells;
   }
   const std::vector<int> last = std::move(units.back());  // practice after the last block
   units.pop_back();
   std::vector<int> order;
   const int count = static_cast<int>(units.size());
-  const std::vector<int> row =
-      protocol.blocks_counterbalanced && count > 1
-          ? latin_square_row(count, protocol.groups.row(participant_number))
-          : std::vector<int>();
+  const std::vector<int> row = protocol.blocks_counterbalanced && count > 1
+                                   ? latin_square_row(count, number)
+                                   : std::vector<int>();
   for (int i = 0; i < count; ++i) {
     const int at = row.empty() ? i : row[static_cast<std::size_t>(i)];
     const auto& unit = units[static_cast<std::size_t>(at)];
@@ -80,19 +114,7 @@ std::vector<int> blocks_in_order(const Protocol& protocol, int participant_numbe
 
 int block_orders(const Protocol& protocol) {
   if (study_of_shapes(protocol)) return renderer_orders(protocol);
-  int orders = 1;
-  std::map<int, int> blocks;  // by session
-  for (int i = 0; i < static_cast<int>(protocol.blocks.size());) {
-    const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(i)];
-    const int cells = cells_of(protocol, i);
-    orders = std::lcm(orders, latin_square_rows(cells));
-    if (!block.practice) ++blocks[block.session];
-    i += cells;
-  }
-  for (const auto& [session, count] : blocks) {
-    if (protocol.blocks_counterbalanced) orders = std::lcm(orders, latin_square_rows(count));
-  }
-  return orders;
+  return square_rows(protocol).period();
 }
 
 bool is_external(const Protocol& protocol) {

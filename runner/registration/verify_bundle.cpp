@@ -137,7 +137,10 @@ class DatasetTables {
       const std::size_t at = trials_.column(table.header[i]);
       if (at < trials_.header.size()) columns.emplace_back(i, at);
     }
-    if (columns.size() + (participant.empty() ? 0 : 1) != trials_.header.size())
+    // Of a table of BIDS, participants.tsv has the person's columns.
+    const std::size_t of_person =
+        participant.empty() ? 0 : 1 + (trials_.column("group") < trials_.header.size() ? 1 : 0);
+    if (columns.size() + of_person != trials_.header.size())
       faults_.push_back(name + ": has other columns than data/trials.csv");
     std::optional<Begin> first;
     for (std::size_t row = 0; row < table.rows.size(); ++row) {
@@ -203,23 +206,28 @@ class DatasetTables {
     return at < trial.size() ? trial[at] : std::string();
   }
 
-  /// `elapsed` is that of the last interval.
-  double begin_of(const std::vector<std::string>& trial) const {
-    const double elapsed = number(trial_field(trial, "elapsed"));
+  /// From the first to the last interval, s; 0: one interval, or none.
+  double last_onset(const std::vector<std::string>& trial) const {
     const std::string onsets = trial_field(trial, "interval_onsets");
     const std::size_t end = onsets.find_last_not_of(';');
-    if (end == std::string::npos) return elapsed;
+    if (end == std::string::npos) return 0;
     const std::size_t before = onsets.rfind(';', end);
     const std::size_t begin = before == std::string::npos ? 0 : before + 1;
-    return elapsed - number(onsets.substr(begin, end + 1 - begin));
+    return number(onsets.substr(begin, end + 1 - begin));
+  }
+
+  /// `elapsed` is that of the last interval.
+  double begin_of(const std::vector<std::string>& trial) const {
+    return number(trial_field(trial, "elapsed")) - last_onset(trial);
   }
 
   /// BIDS has it in place of a column of trials.csv.
   void compare_duration(const std::string& where, const std::string& duration,
                         const std::vector<std::string>& trial) {
-    const bool of_task = trials_.column("task") < trials_.header.size();
     const std::string response_time = trial_field(trial, "response_time");
-    if (!of_task && trial_field(trial, "timed_out") == "0" && duration != response_time)
+    const double expected = number(response_time) + last_onset(trial);
+    if (trial_field(trial, "timed_out") == "0" &&
+        !(std::fabs(number(duration) - expected) <= kTick))
       faults_.push_back(where + ": duration is " + duration +
                         ", in data/trials.csv response_time " + response_time);
   }
@@ -254,18 +262,26 @@ TextTable split_tsv(const std::string& text) {
   return out;
 }
 
-/// Participants of participants.tsv, and whether they are simulated.
+/// Participants of participants.tsv, their groups, and whether they are simulated.
 void compare_people(const std::string& folder, const TextTable& trials,
                     std::vector<std::string>& faults) {
   const TextTable table = split_tsv(read_member(folder, "data/bids/participants.tsv"));
-  const std::size_t id = table.column("participant_id"), simulated = table.column("simulated");
-  std::set<std::pair<std::string, std::string>> there, expected;
-  for (const auto& row : table.rows) {
-    if (std::max(id, simulated) < row.size()) there.insert({row[id], row[simulated]});
+  const auto said_of_person = [](const TextTable& of, const std::vector<std::string>& row) {
+    std::vector<std::string> out;
+    for (const char* const name : {"participant_id", "simulated", "group"}) {
+      const std::size_t at = of.column(name);
+      out.push_back(at < row.size() ? row[at] : "");
+      if (out.back() == "n/a") out.back().clear();
+    }
+    return out;
+  };
+  std::set<std::vector<std::string>> there, expected;
+  for (const auto& row : table.rows) there.insert(said_of_person(table, row));
+  for (const auto& row : trials.rows) {
+    std::vector<std::string> person = said_of_person(trials, row);
+    person.front().insert(0, "sub-");
+    expected.insert(std::move(person));
   }
-  for (const auto& row : trials.rows)
-    expected.insert(
-        {"sub-" + row[trials.column("participant_id")], row[trials.column("simulated")]});
   if (there != expected)
     faults.push_back("data/bids/participants.tsv: has other participants than data/trials.csv");
 }

@@ -333,10 +333,13 @@ void Session::report_level() {
 void Session::begin_task_block() {
   const protocols::TaskBlock& block = station_.plan.block();
   show_pages(PageSpec::When::between, block.name);
+  // The cells of a block have them once, unless a cell has its own.
+  if (block.cell && instructions_read_ == std::pair(block.place, block.instructions)) return;
   read_instructions(block);
 }
 
 void Session::read_instructions(const protocols::TaskBlock& block) {
+  instructions_read_ = {block.place, block.instructions};
   if (block.instructions.empty()) return;
   participant_.read_screens(screens_of(block.instructions));
 }

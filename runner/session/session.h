@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 
 #include "data/record.h"
 #include "protocols/session_plan.h"
@@ -103,6 +104,8 @@ class Session {
   servo::ServoQuality quality_;  ///< likewise, of its intervals so far
   SessionScenes scenes_;
   int asked_trial_ = 0;  ///< the last trial for which an advisor was asked
+  /// Place of the last block in the protocol, and its instructions; none: nothing has been read.
+  std::optional<std::pair<std::size_t, std::string>> instructions_read_;
 };
 
 }  // namespace palpate::runner::session

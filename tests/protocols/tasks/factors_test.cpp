@@ -142,6 +142,33 @@ TEST(Factors, CellsApartFollowWilliamsSquare) {
   EXPECT_EQ(block_orders(protocol), 6);
 }
 
+TEST(Factors, OrdersOfCellsMeetAllOrdersOfBlocks) {
+  json study = crossed_study("constant", "blocked");
+  study["block_order"] = "counterbalanced";
+  const Protocol protocol = parsed(study);
+  std::map<std::pair<std::string, std::string>, int> pairs;
+  const int period = block_orders(protocol);
+  for (int participant = 1; participant <= period; ++participant) {
+    std::string blocks, cells;
+    for (const Trial& trial : worked_off(SessionPlan(protocol, participant, 1))) {
+      const std::string& name = block_of(protocol, trial).name;
+      const std::string& stimulus = shown(protocol, {trial.stimulus, trial.renderer}).name;
+      if (!trial.practice && !blocks.ends_with(name)) blocks += "," + name;
+      if (name == "constant" && !cells.ends_with(stimulus)) cells += stimulus;
+    }
+    ++pairs[{blocks, cells}];
+  }
+  std::set<std::string> blocks, cells;
+  for (const auto& [pair, count] : pairs) {
+    blocks.insert(pair.first);
+    cells.insert(pair.second);
+    EXPECT_EQ(count, pairs.begin()->second);
+  }
+  EXPECT_EQ(cells.size(), 6U);
+  EXPECT_GT(blocks.size(), 1U);
+  EXPECT_EQ(pairs.size(), blocks.size() * cells.size());
+}
+
 TEST(Factors, TracksOfCellsAreTheirOwn) {
   for (const char* const mixing : {"mixed", "blocked"}) {
     const Protocol protocol = parsed(crossed_study("stairs", mixing));
@@ -254,7 +281,21 @@ TEST(Factors, FaultsNameTheirPlace) {
             Places{first + "~1servo~1rate_hz"});
   EXPECT_EQ(with([](json& s) { s["factors"][0]["levels"][0]["set"]["/stimuli/*/name"] = "x"; }),
             Places{first + "~1stimuli~1*~1name"});
-  EXPECT_EQ(with([](json& s) { s["factors"][0]["name"] = "renderer"; }).front(), "/factors/0/name");
+  for (const char* const key : {"asks", "intervals", "answer", "order", "catch_trials"}) {
+    EXPECT_EQ(
+        with(
+            [&](json& s) { s["factors"][0]["levels"][0]["set"][std::string("/block/") + key] = 2; },
+            "blocked"),
+        Places{first + "~1block~1" + key})
+        << "answers of the cells would not compare";
+  }
+  EXPECT_EQ(with([](json& s) { s["factors"][0]["levels"][1]["set"] = json::object(); }),
+            Places{"/factors/0/levels/1/set"})
+      << "levels alike";
+  EXPECT_EQ(with([](json& s) { s["blocks"][0]["factors"] = {"surface"}; }), Places{"/factors/1"})
+      << "a factor that nobody crosses";
+  for (const char* const name : {"renderer", "Group", "elapsed", "tip_x"})
+    EXPECT_EQ(with([&](json& s) { s["factors"][0]["name"] = name; }).front(), "/factors/0/name");
   EXPECT_EQ(with([](json& s) { s["factors"][1]["name"] = "surface"; }).front(), "/factors/1/name");
   EXPECT_EQ(with([](json& s) { s["factors"][1]["levels"][1]["name"] = "s"; }).front(),
             "/factors/1/levels/1/name");

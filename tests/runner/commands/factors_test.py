@@ -56,6 +56,59 @@ class Factors(command_case.CommandCase):
         about = json.loads((self.dir / "psychds" / "dataset_description.json").read_text())
         self.assertIn("size", [one["name"] for one in about["variableMeasured"]])
 
+    def test_columns_may_stand_anywhere_with_the_protocol(self):
+        db = self.simulated(SMALL, "--participants", 4)
+        text, rows = self.exported(db)
+        header = text.splitlines()[0].split(",")
+        moved = [name for name in header if name not in ("surface", "size")] + ["size", "surface"]
+        known = [name for name in header if name not in ("level", "success")]
+        at = known.index("practice") + 1
+        for name, columns in (("moved", moved), ("known", known[:at] + ["level", "success"] + known[at:]),
+                              ("sorted", sorted(header))):
+            with open(self.dir / f"{name}.csv", "w", newline="") as out:
+                table = csv.DictWriter(out, columns)
+                table.writeheader()
+                table.writerows(rows)
+        effects = self.analyzed("--db", db)["effects"]
+        design = self.dir / "p.json"
+        for name in ("moved", "known", "sorted"):
+            self.assertEqual(self.analyzed("--csv", self.dir / f"{name}.csv", "--design", design)["effects"], effects, name)
+        without = self.analyzed("--csv", self.dir / "known.csv")["effects"]  # levels by name
+        for name, effect in effects["exponent"]["a"].items():
+            self.assertAlmostEqual(without["exponent"]["a"][name]["f"] / effect["f"], 1, places=9)
+        alone = self.analyzed("--csv", self.dir / "moved.csv")
+        self.assertIn("Not read: 'size' and 'surface'", " ".join(alone["warnings"]))
+
+    def test_incomplete_cells_are_told(self):
+        _, rows = self.exported(self.simulated(SMALL, "--participants", 4))
+        for row in rows:
+            row["surface"] = "ruogh" if (row["participant_id"], row["surface"], row["size"]) == ("S001", "rough", "small") \
+                else row["surface"]
+        with open(self.dir / "wrong.csv", "w", newline="") as out:
+            table = csv.DictWriter(out, list(rows[0]))
+            table.writeheader()
+            table.writerows(rows)
+        found = self.palpate("analyze", "--csv", self.dir / "wrong.csv").stdout
+        self.assertIn("do not cross the levels of its factors completely", found)
+
+    def test_a_bundle_of_groups_verifies_as_bids(self):
+        study = {**SMALL, "groups": {"names": ["young", "old"]}}
+        db = self.simulated(study, "--participants", 4)
+        about = self.file("about.json", {"version": 1, "authors": [{"name": "Ada"}], "license": "CC0-1.0"})
+        out = self.dir / "bundle"
+        self.palpate("bundle", "--db", db, "--about", about, "--out", out, "--format", "bids")
+        self.assertNotIn("DIFFERS", self.palpate("bundle", "--verify", out).stdout)
+        people = out / "data/bids/participants.tsv"
+        people.write_text(people.read_text().replace("young", "old"))
+        self.assertIn("other participants", self.palpate("bundle", "--verify", out, status=1).stdout)
+        table = next((out / "data/bids").glob("sub-*/ses-1/beh/*_beh.tsv"))
+        lines = table.read_text().splitlines(keepends=True)
+        at = lines[0].split("\t").index("duration")
+        fields = lines[3].split("\t")
+        fields[at] = str(float(fields[at]) + 5)
+        table.write_text("".join([*lines[:3], "\t".join(fields), *lines[4:]]))
+        self.assertIn("duration is", self.palpate("bundle", "--verify", out, status=1).stdout)
+
     def test_effects_are_those_of_paired_differences(self):
         db = self.simulated(SMALL, "--participants", 7)
         found = self.analyzed("--db", db)
