@@ -46,14 +46,28 @@ struct IntervalRecord {
   std::int64_t onset_ns = 0, end_ns = 0;  ///< forces on, forces off; session clock; 0: not yet
 };
 
+/// A movement from home to a target, and its measures from the recorded samples
+/// (runner/session/reach_measures.h). None: it has no such measure.
+struct ReachRecord {
+  std::string kind;                         ///< "field", "catch", "clamp"
+  std::optional<double> duration;           ///< s
+  std::optional<double> peak_speed;         ///< m/s
+  std::optional<double> deviation;          ///< m, sideways, at peak speed
+  std::optional<double> largest_deviation;  ///< m, sideways
+  std::optional<double> path_ratio;         ///< length of the path over that of its chord
+  std::optional<double> endpoint_error;     ///< m, from the target
+  std::optional<double> side_force;         ///< N, sideways on the hand, at peak speed
+  std::optional<double> adaptation;         ///< clamp: slope of that force on the field's
+};
+
 /// What a trial asks. Onset, response time and contact of its record are those of the last interval
 /// felt.
 struct TaskRecord {
-  /// "identify", "compare", "detect", "rate", "adjust", "external"
+  /// "identify", "compare", "detect", "rate", "adjust", "external", "reach"
   std::string task = "identify";
-  std::string block_name;                ///< "": the protocol has no blocks (version 1)
-  int track = 1;                         ///< stimulus, renderer and procedure
-  std::optional<double> level;           ///< level of the trial; adjust: start value
+  std::string block_name;       ///< "": the protocol has no blocks (version 1)
+  int track = 1;                ///< stimulus, renderer and procedure
+  std::optional<double> level;  ///< of the trial; adjust: start value; reach: the target, from 1
   std::optional<double> standard_level;  ///< of the standard, if it has one
   bool catch_trial = false;
   /// In order; adjust: one for each stimulus felt. Empty: one, without a level (intervals_of).
@@ -64,6 +78,7 @@ struct TaskRecord {
   std::optional<double> number;  ///< rate: as answered; adjust: the level that was set
   std::optional<double> confidence;
   std::optional<std::int64_t> confidence_ns;  ///< session clock
+  std::optional<ReachRecord> reach = std::nullopt;
 
   bool of_block() const { return !block_name.empty(); }
 };

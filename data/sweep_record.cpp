@@ -71,6 +71,7 @@ std::vector<std::string> measures_of(const std::string& task) {
   if (task == "detect") return {"threshold", "d_prime"};
   if (task == "rate") return {"exponent"};
   if (task == "adjust") return {"pse", "jnd"};
+  if (task == "reach") return {"deviation", "adaptation"};
   return {"accuracy", "time"};
 }
 

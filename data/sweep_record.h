@@ -49,8 +49,9 @@ struct SweepRow {
 /// For a protocol of version 2, for each block B except practice, stimulus S and renderer R, means
 /// over the participants and their standard errors: compare and detect threshold_B_S_R (compare
 /// with levels on both sides of the standard: PSE) and threshold_se_B_S_R, compare jnd_..., detect
-/// d_prime_..., rate exponent_..., adjust pse_... and jnd_..., identify accuracy_... and time_...
-/// (s) likewise, and bits_B_R. Participants without the figure are left out.
+/// d_prime_..., rate exponent_..., adjust pse_... and jnd_..., reach deviation_... and
+/// adaptation_..., identify accuracy_... and time_... (s) likewise, and bits_B_R. Participants
+/// without the figure are left out.
 std::vector<std::string> figure_columns(const SweepPlan& plan);
 
 /// The measures of a cell of a protocol of version 2, and the names of their columns.

@@ -220,6 +220,7 @@ void read_texts(ObjectReader& reader, Protocol& protocol) {
     section.text("disagree", protocol.texts.disagree);
     section.text("other_number", protocol.texts.other_number);
     section.text("answer_first", protocol.texts.answer_first);
+    section.text("go_home", protocol.texts.go_home);
   });
 }
 
@@ -394,7 +395,9 @@ Protocol read_design(const json& root, const MeshFiles& files, FaultList& faults
   reader.seed("seed", protocol.seed);
   reader.refuse_unknown_keys();
   protocol.groups.seed = protocol.seed;
+  check_reaching(protocol, faults);
   if (faults.empty()) add_cells(root, files, protocol, faults);
+  if (faults.empty()) add_channels(protocol);
   if (faults.empty()) (protocol.version == 2 ? check_blocks : check_schedule)(protocol, faults);
   return protocol;
 }

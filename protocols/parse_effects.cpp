@@ -301,6 +301,7 @@ void read_field_keys(ObjectReader& reader, stimuli::FieldSpec& field) {
       reader.number("damping_ns_per_m", damping, kDamping, Presence::required);
       field.damping = Mat3(damping);
       read_direction(reader, "axis", field.axis, Presence::required);
+      reader.boolean("destabilising", field.destabilising);
       reader.number("low_pass_s", field.low_pass, kLowPass);
       return;
     }

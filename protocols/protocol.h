@@ -30,10 +30,12 @@ enum class TaskKind {
   rate,      ///< a number, or a step of a labelled scale
   adjust,    ///< turns a parameter until the stimulus equals the standard
   external,  ///< another program chooses the stimulus and reports the answer (palpate serve)
+  reach,     ///< moves from home to a target, through the fields of the stimulus
 };
 /// "identify", ...
 inline const char* to_string(TaskKind kind) {
-  constexpr std::array kNames = {"identify", "compare", "detect", "rate", "adjust", "external"};
+  constexpr std::array kNames = {"identify", "compare",  "detect", "rate",
+                                 "adjust",   "external", "reach"};
   return kNames[static_cast<std::size_t>(kind)];
 }
 
@@ -93,6 +95,30 @@ struct CrossedFactor {
   std::vector<std::size_t> levels;
 };
 
+/// The field that is felt on the way to a target.
+enum class ReachTrial {
+  field,  ///< the fields of the stimulus
+  none,   ///< catch trial: no field, unannounced
+  clamp,  ///< a channel from home to the target, which shows what the hand has learnt to push
+};
+/// "field", "catch", "clamp"
+inline const char* to_string(ReachTrial kind) {
+  constexpr std::array kNames = {"field", "catch", "clamp"};
+  return kNames[static_cast<std::size_t>(kind)];
+}
+
+/// Movements from home to targets. World frame, m.
+struct ReachingSpec {
+  static constexpr double kStopSpeed = 0.02;  ///< m/s; slower is at rest
+  Vec3 home{0, 0, 0};
+  double home_radius = 0.005, target_radius = 0.005;
+  std::vector<Vec3> targets;
+  std::optional<double> least_time, most_time;  ///< s, of a movement in time
+  double clamp_share = 0, catch_share = 0;      ///< of all trials
+  double clamp_stiffness = 1000;                ///< N/m, of the channel
+  std::vector<int> channels;  ///< of each target: index into Protocol::stimuli; empty: no clamps
+};
+
 struct TaskBlock {
   /// Unique within the protocol, except among the cells of a block; "": of the study of shapes.
   std::string name;
@@ -133,6 +159,7 @@ struct TaskBlock {
   double modulus = 0;                 ///< rate: the standard's number; 0: none is given
   double turn = 0;                    ///< adjust: of the level, a key press
   std::vector<double> starts;         ///< adjust: levels, in turn
+  std::optional<ReachingSpec> reaching;  ///< reach
   std::optional<ConfidenceSpec> confidence;
   bool feedback = false;
   double time_out = 60;  ///< s, for the answer, from the begin of the last interval
@@ -318,6 +345,7 @@ struct Protocol {
     std::string disagree = "I do not agree";
     std::string other_number = "Please type another number:";  ///< the range follows
     std::string answer_first = "Please type an answer first.";
+    std::string go_home = "Go back to the start.";
   } texts;
   std::optional<MaskingNoise> masking_noise;
   std::optional<Sounds> sounds;  ///< version 2

@@ -41,6 +41,7 @@ struct Trial {
   std::optional<double> level = std::nullopt;  ///< adjust: the starting level
   bool catch_trial = false;
   std::vector<Interval> intervals = {};  ///< in order of presentation
+  ReachTrial reach = ReachTrial::field;  ///< reach; `level` is the number of the target, from 1
 };
 
 /// The block of a trial.

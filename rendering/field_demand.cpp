@@ -43,8 +43,10 @@ FieldDemand demand_of(const std::vector<stimuli::FieldSpec>& fields, double rate
     if (field.kind != Kind::viscous && field.kind != Kind::curl) continue;
     const double size =
         field.kind == Kind::viscous ? size_of(field.damping) : std::abs(field.damping[0][0]);
-    out.damping += field.kind == Kind::viscous ? size * alpha / (2 - alpha)
-                                               : curl_demand(size, field.low_pass, 1 / rate);
+    if (field.kind == Kind::viscous)
+      out.damping += size * alpha / (2 - alpha);
+    else if (!field.destabilising)
+      out.damping += curl_demand(size, field.low_pass, 1 / rate);
     out.noise += size * alpha * resolution * rate;
   }
   return out;

@@ -16,7 +16,8 @@ struct FieldDemand {
 
 /// The damping that a sampled viscous field of B N s/m needs is B alpha / (2 - alpha), alpha = T /
 /// (low_pass + T) (Colgate & Schenkel 1997, with the low pass); a curl field's is the largest power
-/// that it puts into circles, by the square of their speed.
+/// that it puts into circles, by the square of their speed, or 0 where it is left to the hand
+/// (destabilising).
 /// \param rate  Hz. \param resolution  m
 FieldDemand demand_of(const std::vector<stimuli::FieldSpec>& fields, double rate,
                       double resolution);

@@ -86,7 +86,7 @@ struct FieldSpec {
   double radius = 0;           ///< m; spring: of the ball; channel: half its width
   double stiffness = 0;        ///< N/m
   Mat3 damping{0};             ///< N s/m; curl: the scalar is damping[0][0]
-  bool destabilising = false;  ///< viscous: may feed energy
+  bool destabilising = false;  ///< viscous, curl: may feed energy
   double low_pass = 0.002;     ///< s, of the velocity
   Vec3 axis{0, 0, 1};          ///< unit; curl: right-handed about it; vibration: along it
   double amplitude = 0;        ///< N

@@ -40,11 +40,19 @@ std::vector<StoredFactor> factors_of(Store& store) {
   return out;
 }
 
+bool have_reaches(Store& store) {
+  const auto reaches = [](const StoredBlock& block) { return block.task == "reach"; };
+  return std::ranges::any_of(store.protocols(), [&](const ProtocolInfo& protocol) {
+    return std::ranges::any_of(read_stored_protocol(protocol.text).blocks, reaches);
+  });
+}
+
 }  // namespace
 
 ExportClock::ExportClock(Store& store, Times times)
     : times_(times),
       tasks_(have_blocks(store.protocols())),
+      reaches_(have_reaches(store)),
       torque_(store),
       groups_(store),
       factors_(factors_of(store)) {

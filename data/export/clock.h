@@ -23,6 +23,8 @@ class ExportClock {
 
   /// Whether rows of trials have the columns of tasks: a protocol of the database has blocks.
   bool tasks() const { return tasks_; }
+  /// Whether they have those of movements, too: a protocol has blocks of reaching.
+  bool reaches() const { return reaches_; }
   /// Rows of trials have the column torque_driven if any run left torque out.
   const TorqueNotes& torque() const { return torque_; }
 
@@ -46,7 +48,7 @@ class ExportClock {
  private:
   std::int64_t since_first(const Participant& person, std::int64_t unix_ns) const;  // ns
   Times times_;
-  bool tasks_ = false;
+  bool tasks_ = false, reaches_ = false;
   TorqueNotes torque_;
   ParticipantGroups groups_;
   std::vector<StoredFactor> factors_;

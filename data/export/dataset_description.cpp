@@ -86,6 +86,11 @@ void add_answers(nlohmann::ordered_json& levels, const ProtocolFacts& facts) {
     levels["yes"] = "there was something";
     levels["no"] = "there was nothing";
   }
+  if (tasks.contains("reach")) {
+    levels["in_time"] = "the movement took as long as asked";
+    levels["fast"] = "less than that";
+    levels["slow"] = "more than that";
+  }
   if (tasks.empty() || tasks.contains("identify")) add_stimuli(levels, facts);
 }
 

@@ -182,6 +182,53 @@ std::vector<Column> with_tasks(std::vector<Column> columns) {
   return columns;
 }
 
+/// Adds the columns of movements to targets, and what the others mean of them.
+std::vector<Column> with_reaches(std::vector<Column> columns) {
+  for (Column& column : columns) {
+    const std::string_view name = column.name;
+    if (name == "task") {
+      column.levels.emplace_back("reach", "move from the start to a target");
+    } else if (name == "level") {
+      column.description =
+          "The varied number of the stimulus; adjust: its start value; reach: number of the target "
+          "in the protocol, from 1; missing in catch trials and if nothing is varied";
+    } else if (name == "response") {
+      column.description =
+          "Answer: identify: a stimulus; compare: the interval, or same or different; detect: yes "
+          "or no; rate: a number; adjust: the level that was set; reach: in_time, fast or slow; "
+          "missing: no answer";
+    }
+  }
+  const std::vector<Column> more = {
+      {"reach_kind",
+       "reach: what was felt on the way",
+       "",
+       {{"field", "the fields of the stimulus"},
+        {"catch", "nothing, unannounced"},
+        {"clamp", "a channel from the start to the target"}}},
+      {"duration",
+       "reach: from the first tick at 20 mm/s or faster before the peak speed to the first tick at "
+       "rest in the target",
+       "s"},
+      {"peak_speed", "reach: largest speed of the tip, over 20 ms", "m/s"},
+      {"deviation",
+       "reach: sideways place of the tip at peak speed, from the line of the movement's begin to "
+       "the target; positive: to the left of the line seen from +z (of a line along z: towards +y)",
+       "m"},
+      {"largest_deviation", "reach: the sideways place that is farthest from the line", "m"},
+      {"path_ratio", "reach: length of the path over the distance of its ends", "1"},
+      {"endpoint_error", "reach: distance of the tip from the target at the end", "m"},
+      {"side_force", "reach: sideways force on the hand at peak speed, as rendered", "N"},
+      {"adaptation",
+       "reach, clamp trials: slope of the channel's sideways force on that of the field at the "
+       "same velocity, through 0; 1: the hand pushes as the field would have needed; missing: no "
+       "clamp trial, or the field gives no sideways force",
+       "1"},
+  };
+  columns.insert(columns.end(), more.begin(), more.end());
+  return columns;
+}
+
 std::vector<Column> with_torque(std::vector<Column> columns) {
   columns.push_back(
       {"torque_driven",
@@ -335,22 +382,25 @@ std::vector<Column> with_factors(std::vector<Column> columns,
 /// \param cut_off  of attempts that were cut off
 std::span<const Column> columns_for(const ExportClock& clock, bool cut_off) {
   const bool torque = !cut_off && clock.torque().any(), tasks = !cut_off && clock.tasks();
+  const bool reaches = !cut_off && clock.reaches();
   const bool groups = clock.groups().any(), relative = clock.relative();
   std::vector<std::pair<std::string, std::string>> levels;
   for (const StoredFactor& factor : clock.factors()) {
     levels.emplace_back(factor.name, "");
     levels.insert(levels.end(), factor.levels.begin(), factor.levels.end());
   }
-  static std::map<std::tuple<bool, bool, bool, bool, bool, decltype(levels)>, std::vector<Column>>
+  static std::map<std::tuple<bool, bool, bool, bool, bool, bool, decltype(levels)>,
+                  std::vector<Column>>
       tables;
   static std::mutex mutex;
   const std::lock_guard lock(mutex);
   const auto [table, is_new] =
-      tables.try_emplace({cut_off, torque, tasks, groups, relative, std::move(levels)});
+      tables.try_emplace({cut_off, torque, tasks, reaches, groups, relative, std::move(levels)});
   std::vector<Column>& columns = table->second;
   if (!is_new) return columns;
   columns = cut_off ? make_attempts() : make_trials();
   if (tasks) columns = with_tasks(std::move(columns));
+  if (reaches) columns = with_reaches(std::move(columns));
   if (torque) columns = with_torque(std::move(columns));
   if (relative) columns = made_relative(std::move(columns));
   if (groups) columns = with_group(std::move(columns));

@@ -150,6 +150,12 @@ void put_columns_of_trial(Row& row, const StoredTrial& trial, const ExportClock&
         << task.confidence_delay << task.comparison_interval << task.onsets << task.ends
         << task.levels;
   }
+  if (clock.reaches()) {
+    const ReachRecord reach = record.task.reach.value_or(ReachRecord());
+    row << reach.kind << reach.duration << reach.peak_speed << reach.deviation
+        << reach.largest_deviation << reach.path_ratio << reach.endpoint_error << reach.side_force
+        << reach.adaptation;
+  }
   if (clock.torque().any()) row << clock.torque().driven(trial);
   if (clock.relative()) row << clock.elapsed(trial);
 }

@@ -64,6 +64,15 @@ void validate_task(Validator& validator, const TaskRecord& task) {
   for (const auto& value : {task.level, task.standard_level, task.number, task.confidence}) {
     if (value) validator.finite("a number of the task", *value);
   }
+  if (task.reach) {
+    const ReachRecord& reach = *task.reach;
+    validator.present("kind of a reach", reach.kind);
+    for (const auto& value :
+         {reach.duration, reach.peak_speed, reach.deviation, reach.largest_deviation,
+          reach.path_ratio, reach.endpoint_error, reach.side_force, reach.adaptation}) {
+      if (value) validator.finite("a measure of the reach", *value);
+    }
+  }
   for (const IntervalRecord& interval : task.intervals) {
     validator.text("stimulus", interval.stimulus);
     if (interval.level) validator.finite("level", *interval.level);

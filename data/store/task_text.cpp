@@ -41,6 +41,19 @@ IntervalRecord interval_of(const Json& in) {
   return interval;
 }
 
+/// The names of a reach's measures, in text and columns.
+template <class Record, class Visit>
+void for_each_measure(Record& reach, Visit visit) {
+  visit("duration", reach.duration);
+  visit("peak_speed", reach.peak_speed);
+  visit("deviation", reach.deviation);
+  visit("largest_deviation", reach.largest_deviation);
+  visit("path_ratio", reach.path_ratio);
+  visit("endpoint_error", reach.endpoint_error);
+  visit("side_force", reach.side_force);
+  visit("adaptation", reach.adaptation);
+}
+
 /// Only the point renderer has no side; it gives force only.
 bool gives_torque(const std::string& renderer) { return !renderer.empty() && renderer != "point"; }
 
@@ -60,6 +73,11 @@ std::optional<std::string> task_text(const TaskRecord& task) {
   put_if(out, "number", task.number);
   put_if(out, "confidence", task.confidence);
   put_if(out, "confidence_ns", task.confidence_ns);
+  if (task.reach) {
+    Json& reach = out["reach"] = {{"kind", task.reach->kind}};
+    for_each_measure(*task.reach,
+                     [&](const char* key, const auto& value) { put_if(reach, key, value); });
+  }
   return out.dump();
 }
 
@@ -80,6 +98,11 @@ TaskRecord parse_task_text(const std::string& text) {
     take_if(in, "number", task.number);
     take_if(in, "confidence", task.confidence);
     take_if(in, "confidence_ns", task.confidence_ns);
+    if (!in.contains("reach")) return task;
+    const Json& reach = in.at("reach");
+    task.reach.emplace().kind = reach.at("kind").get<std::string>();
+    for_each_measure(*task.reach,
+                     [&](const char* key, auto& value) { take_if(reach, key, value); });
     return task;
   } catch (const JsonError& error) {
     throw std::invalid_argument(std::string("its task is damaged: ") + error.what());

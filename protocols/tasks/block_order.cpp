@@ -149,7 +149,7 @@ long long most_trials_of(const TaskBlock& block) {
   if (block.task == TaskKind::external) return block.repetitions;
   long long trials = 0;
   for (const BlockTrack& track : tracks_of(block)) {
-    trials += track.procedure == nullptr ? block.repetitions
+    trials += track.procedure == nullptr ? repetitions_of_track(block)
                                          : static_cast<long long>(most_trials(*track.procedure));
   }
   return with_catch_trials(block, trials);

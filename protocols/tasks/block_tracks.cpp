@@ -10,6 +10,13 @@ namespace {
 constexpr std::uint64_t kTaskStream = 5;      // schedule.cpp uses 1 to 4
 constexpr std::uint64_t kCellStreams = 1000;  // more than blocks of a protocol
 
+/// The stimulus that is felt in a reach; -1: nothing.
+int felt_on_the_way(const ReachingSpec& reaching, const Trial& trial) {
+  if (trial.reach == ReachTrial::field) return trial.stimulus;
+  if (trial.reach == ReachTrial::none) return -1;
+  return reaching.channels.at(static_cast<std::size_t>(*trial.level) - 1);
+}
+
 int in_cell(const std::map<int, int>& of_cells, int stimulus, std::optional<int> plain) {
   const auto found = of_cells.find(stimulus);
   return found != of_cells.end() ? found->second : plain.value_or(-1);
@@ -44,6 +51,11 @@ std::uint64_t stream_of(std::size_t place, std::optional<std::size_t> cell) {
 
 std::uint64_t stream_of(const TaskBlock& block) { return stream_of(block.place, block.cell); }
 
+long long repetitions_of_track(const TaskBlock& block) {
+  const std::size_t targets = block.reaching ? block.reaching->targets.size() : 1;
+  return block.repetitions * static_cast<long long>(targets);
+}
+
 long long with_catch_trials(const TaskBlock& block, long long trials) {
   return trials +
          std::llround(static_cast<double>(trials) * block.catch_trials / (1 - block.catch_trials));
@@ -75,6 +87,9 @@ void set_intervals(const TaskBlock& block, int position, Trial& trial) {
     case TaskKind::adjust:
       trial.intervals = {asked, standard};  // alternating as often as the participant likes
       break;
+    case TaskKind::reach:
+      trial.intervals = {{felt_on_the_way(*block.reaching, trial), trial.renderer}};
+      return;  // a catch trial has a target, too
   }
   if (trial.catch_trial) trial.level.reset();
 }

@@ -25,6 +25,9 @@ std::vector<BlockTrack> tracks_of(const TaskBlock& block);
 /// The number of the first track: the cells of a block number theirs together.
 int first_track(const TaskBlock& block);
 
+/// The number of trials of a track without procedure; reach: of all its targets.
+long long repetitions_of_track(const TaskBlock& block);
+
 /// The number of trials with catch trials included.
 long long with_catch_trials(const TaskBlock& block, long long trials);
 

@@ -1,6 +1,8 @@
 #include "protocols/tasks/block_trials.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <cstddef>
 #include <string>
 #include <utility>
@@ -23,8 +25,40 @@ struct Category {
   int count = 0;
 };
 
+/// How many of a track's trials to a target have each field. Clamps begin with the first targets,
+/// catch trials with the last, so that few of both go to different ones.
+std::array<int, 3> counts_of_reaches(const TaskBlock& block, std::size_t target) {
+  const ReachingSpec& reaching = *block.reaching;
+  const auto targets = static_cast<long long>(reaching.targets.size());
+  const auto all = static_cast<double>(repetitions_of_track(block));
+  const long long clamps = std::llround(reaching.clamp_share * all);
+  const long long catches = std::llround(reaching.catch_share * all);
+  const auto place = static_cast<long long>(target);
+  const auto clamped = static_cast<int>(clamps / targets + (place < clamps % targets ? 1 : 0));
+  const auto caught =
+      static_cast<int>(catches / targets + (targets - 1 - place < catches % targets ? 1 : 0));
+  return {block.repetitions - clamped - caught, caught, clamped};
+}
+
+void add_reaches(const TaskBlock& block, const Category& category,
+                 std::vector<Category>& categories) {
+  for (std::size_t t = 0; t < block.reaching->targets.size(); ++t) {
+    const std::array<int, 3> counts = counts_of_reaches(block, t);
+    for (const ReachTrial kind : {ReachTrial::field, ReachTrial::none, ReachTrial::clamp}) {
+      Category one = category;
+      one.name += " to target " + std::to_string(t + 1) + ", " + to_string(kind);
+      one.trial.level = static_cast<double>(t + 1);
+      one.trial.reach = kind;
+      one.trial.catch_trial = kind == ReachTrial::none;
+      one.count = counts[static_cast<std::size_t>(kind)];
+      if (one.count > 0) categories.push_back(std::move(one));
+    }
+  }
+}
+
 void add_levels(const TaskBlock& block, const BlockTrack& track, Category category,
                 std::vector<Category>& categories) {
+  if (block.reaching) return add_reaches(block, category, categories);
   if (track.procedure == nullptr) {
     category.count = block.repetitions;
     categories.push_back(category);
@@ -225,9 +259,10 @@ std::vector<Trial> trials_of_block(const Protocol& protocol, int participant, in
 
 Quat orientation_in_block(const Protocol& protocol, int participant, std::uint64_t block,
                           std::size_t shown) {
-  Random random = task_stream(protocol.seed, participant,
-                              stream_of(protocol.blocks[static_cast<std::size_t>(block)]),
-                              kTaskOrientation, shown + 1);
+  const TaskBlock& asked = protocol.blocks[static_cast<std::size_t>(block)];
+  if (asked.reaching) return Quat(1, 0, 0, 0);  // targets and fields stand in one frame
+  Random random =
+      task_stream(protocol.seed, participant, stream_of(asked), kTaskOrientation, shown + 1);
   switch (protocol.orientation) {
     case OrientationKind::uniform:
       return stimuli::uniform_rotation(random);

@@ -80,6 +80,11 @@ std::vector<TaskAnswer> answers_of(const Protocol& protocol, const TaskBlock& bl
       add("switch");
       add("done");
       break;
+    case TaskKind::reach:
+      add("in_time", "in time");
+      add("fast", "too fast");
+      add("slow", "too slow");
+      break;
     case TaskKind::external:
       break;
   }
@@ -209,6 +214,8 @@ void read_answers(ObjectReader& reader, const Protocol& protocol, TaskBlock& blo
     read_rating(reader, block);
   } else if (block.task == TaskKind::external) {
     read_external_answers(reader, protocol, block);
+  } else if (block.task == TaskKind::reach) {
+    block.answers = answers_of(protocol, block);  // the movement gives the answer, no key
   } else {
     read_answer_keys(reader, protocol, block);
   }
@@ -379,6 +386,8 @@ void read_level(ObjectReader& reader, TaskBlock& block) {
 
 /// Level and procedure, or repetitions.
 void read_variation(ObjectReader& reader, TaskBlock& block) {
+  if (block.task == TaskKind::reach)
+    return reader.integer("repetitions", block.repetitions, kManyTimes, Presence::required);
   read_level(reader, block);
   const bool varied = reader.has("level");
   if (block.task == TaskKind::adjust) {
@@ -483,6 +492,92 @@ void read_external(ObjectReader& reader, TaskBlock& block) {
   block.most = std::max(least, most);
 }
 
+constexpr NumberRange kPlace{-0.5, 0.5, "m"};
+constexpr NumberRange kReachRadius{0.001, 0.05, "m"};
+constexpr std::size_t kMostTargets = 32;
+
+bool read_place(const json& value, const std::string& pointer, Vec3& out, FaultList& faults) {
+  if (!value.is_array() || value.size() != 3) {
+    faults.add(pointer, "expected a place [x, y, z] in m" + found_text(value));
+    return false;
+  }
+  bool read = true;
+  for (int k = 0; k < 3; ++k) {
+    const auto at = static_cast<std::size_t>(k);
+    read &= read_number(value[at], child_pointer(pointer, at), out[k], kPlace, faults);
+  }
+  return read;
+}
+
+void read_targets(ObjectReader& reader, ReachingSpec& reaching) {
+  const json* const list = reader.array("targets_m", 1, kMostTargets, Presence::required);
+  if (list == nullptr) return;
+  const double apart = reaching.home_radius + reaching.target_radius;
+  for (std::size_t i = 0; i < list->size(); ++i) {
+    const std::string pointer = child_pointer(reader.pointer("targets_m"), i);
+    Vec3 target(0);
+    if (!read_place((*list)[i], pointer, target, reader.faults())) continue;
+    if (!(glm::length(target - reaching.home) > apart))
+      reader.faults().add(pointer,
+                          "expected a target more than home_radius_m and target_radius_m away "
+                          "from home");
+    if (std::find(reaching.targets.begin(), reaching.targets.end(), target) !=
+        reaching.targets.end())
+      reader.faults().add(pointer, "expected each target once");
+    reaching.targets.push_back(target);
+  }
+}
+
+void read_time_window(ObjectReader& reader, ReachingSpec& reaching) {
+  constexpr NumberRange kMovement{0, 60, "s"};
+  const json* const window = reader.array("time_window_s", 2, 2);
+  if (window == nullptr) return;
+  double least = 0, most = 0;
+  const std::string pointer = reader.pointer("time_window_s");
+  const bool read = read_number((*window)[0], child_pointer(pointer, std::size_t{0}), least,
+                                kMovement, reader.faults()) &
+                    read_number((*window)[1], child_pointer(pointer, std::size_t{1}), most,
+                                kMovement, reader.faults());
+  if (!read) return;
+  if (!(least < most))
+    reader.faults().add(child_pointer(pointer, std::size_t{1}), "expected more than the first");
+  reaching.least_time = least;
+  reaching.most_time = most;
+}
+
+void read_reach(ObjectReader& reader, TaskBlock& block) {
+  constexpr NumberRange kChannel{50, 20000, "N/m"};
+  ReachingSpec& reaching = block.reaching.emplace();
+  reader.vector("home_m", reaching.home, kPlace);
+  reader.number("home_radius_m", reaching.home_radius, kReachRadius);
+  reader.number("target_radius_m", reaching.target_radius, kReachRadius);
+  read_targets(reader, reaching);
+  read_time_window(reader, reaching);
+  reader.number("clamp_share", reaching.clamp_share, kShareOfTrials);
+  reader.number("catch_share", reaching.catch_share, kShareOfTrials);
+  reader.number("clamp_stiffness_n_per_m", reaching.clamp_stiffness, kChannel);
+  if (reaching.clamp_share + reaching.catch_share > 0.5)
+    reader.faults().add(reader.pointer("catch_share"),
+                        "expected at most half of all trials together with clamp_share");
+}
+
+/// Faults what only all keys of a block of reaching tell.
+void check_reach(ObjectReader& reader, const TaskBlock& block) {
+  const ReachingSpec& reaching = *block.reaching;
+  if (reaching.most_time && !(block.time_out > *reaching.most_time))
+    reader.faults().add(reader.pointer("time_out_s"),
+                        "expected more than the longest time of time_window_s");
+  const auto trials =
+      static_cast<double>(block.repetitions) * static_cast<double>(reaching.targets.size());
+  const auto check = [&](const char* key, double share) {
+    if (share > 0 && !reaching.targets.empty() && share * trials < 0.5)
+      reader.faults().add(reader.pointer(key),
+                          "expected a share that is a trial or more of each stimulus");
+  };
+  check("clamp_share", reaching.clamp_share);
+  check("catch_share", reaching.catch_share);
+}
+
 void read_task_keys(ObjectReader& reader, const Protocol& protocol, TaskBlock& block) {
   switch (block.task) {
     case TaskKind::identify:
@@ -502,6 +597,9 @@ void read_task_keys(ObjectReader& reader, const Protocol& protocol, TaskBlock& b
       break;
     case TaskKind::external:
       read_external(reader, block);
+      break;
+    case TaskKind::reach:
+      read_reach(reader, block);
       break;
   }
 }
@@ -565,7 +663,8 @@ TaskBlock read_block(ObjectReader& reader, const Protocol& protocol) {
                                           {"detect", TaskKind::detect},
                                           {"rate", TaskKind::rate},
                                           {"adjust", TaskKind::adjust},
-                                          {"external", TaskKind::external}},
+                                          {"external", TaskKind::external},
+                                          {"reach", TaskKind::reach}},
                                          Presence::required);
   if (!task) return block;  // the other keys depend on it
   block.task = *task;
@@ -589,6 +688,7 @@ TaskBlock read_block(ObjectReader& reader, const Protocol& protocol) {
                         "expected more than interval_limit_s: the time for the answer begins with "
                         "the last interval");
   }
+  if (block.reaching) check_reach(reader, block);
   if (block.task != TaskKind::external) reader.boolean("feedback", block.feedback);
   if (block.feedback && (block.task == TaskKind::rate || block.task == TaskKind::adjust)) {
     reader.faults().add(reader.pointer("feedback"),
@@ -671,6 +771,47 @@ void check_blocks(const Protocol& protocol, FaultList& faults) {
       faults.add(block_pointer(protocol.blocks[i].place) + "/order", error.what());
     }
   }
+}
+
+void add_channels(Protocol& protocol) {
+  std::size_t number = 0;
+  for (TaskBlock& block : protocol.blocks) {
+    if (!block.reaching || block.reaching->clamp_share == 0) continue;
+    ReachingSpec& reaching = *block.reaching;
+    reaching.channels.clear();
+    for (const Vec3& target : reaching.targets) {
+      StimulusSpec channel;
+      channel.name = "channel " + std::to_string(++number);
+      channel.place = protocol.stimuli[static_cast<std::size_t>(block.stimuli.front())].place;
+      channel.object.shape = stimuli::ShapeKind::none;
+      channel.object.material = protocol.material;
+      stimuli::FieldSpec& field = channel.object.fields.emplace_back();
+      field.kind = stimuli::FieldSpec::Kind::channel;
+      field.centre = reaching.home;
+      field.to = target;
+      field.stiffness = reaching.clamp_stiffness;
+      reaching.channels.push_back(static_cast<int>(protocol.stimuli.size()));
+      const auto list = [](const Vec3& v) { return json{v.x, v.y, v.z}; };
+      const json text = {{"name", channel.name},
+                         {"shape", "none"},
+                         {"fields",
+                          {{{"kind", "channel"},
+                            {"from_m", list(reaching.home)},
+                            {"to_m", list(target)},
+                            {"stiffness_n_per_m", reaching.clamp_stiffness}}}}};
+      protocol.stimulus_texts.push_back(text.dump());
+      protocol.stimuli.push_back(std::move(channel));
+    }
+  }
+}
+
+void check_reaching(const Protocol& protocol, FaultList& faults) {
+  const bool any = std::any_of(protocol.blocks.begin(), protocol.blocks.end(),
+                               [](const TaskBlock& block) { return block.reaching.has_value(); });
+  if (!any) return;
+  if (!protocol.samples)
+    faults.add("/samples", "expected true: the measures of task 'reach' come from its samples");
+  if (protocol.reach) faults.add("/reach", "expected no extended probe with task 'reach'");
 }
 
 void read_blocks(ObjectReader& reader, Protocol& protocol) {

@@ -28,6 +28,10 @@ std::vector<ScaleStep> read_scale_steps(ObjectReader& reader, const char* key, P
 void read_pages(ObjectReader& reader, Protocol& protocol, const MeshFiles& files);
 /// Reads sounds and responses: audio and input devices beside screen and keyboard.
 void read_periphery(ObjectReader& reader, Protocol& protocol);
+/// Faults blocks of reaching in a protocol that cannot have them.
+void check_reaching(const Protocol& protocol, FaultList& faults);
+/// Adds the channels of clamp trials as stimuli, "channel 1", ..., after all others.
+void add_channels(Protocol& protocol);
 /// Checks that every stimulus can have every level that a block may show, and that the blocks'
 /// trials have an order.
 void check_blocks(const Protocol& protocol, FaultList& faults);

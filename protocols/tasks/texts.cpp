@@ -36,6 +36,8 @@ std::string cell_of(const Protocol& protocol, const TaskBlock& block) {
   return levels;
 }
 
+bool is_reaching(const TaskBlock& block) { return block.reaching.has_value(); }
+
 class TextPlaces {
  public:
   explicit TextPlaces(Protocol& protocol) {
@@ -44,6 +46,8 @@ class TextPlaces {
       add_labels(protocol);
     } else {
       add_task_texts(protocol.texts);
+      if (std::ranges::any_of(protocol.blocks, is_reaching))
+        add("texts.go_home", protocol.texts.go_home);
       for (TaskBlock& block : protocol.blocks) add_block(protocol, block);
       for (PageSpec& page : protocol.pages) add_page(page);
     }
@@ -101,7 +105,9 @@ class TextPlaces {
     add_own("instructions", block.instructions);
     add_own("question", block.question);
     const char* const kind = block.task == TaskKind::rate ? "scale." : "keys.";
-    for (TaskAnswer& answer : block.answers) add_own(kind + answer.name, answer.label, true);
+    if (!block.reaching) {
+      for (TaskAnswer& answer : block.answers) add_own(kind + answer.name, answer.label, true);
+    }
     if (!block.confidence) return;
     add_own("confidence.question", block.confidence->question);
     std::size_t step = 0;
@@ -148,7 +154,7 @@ struct TextsRead {
     for (const TaskBlock& block : protocol.blocks) {
       intervals |=
           block.task == TaskKind::compare || (block.task == TaskKind::rate && block.standard);
-      no_question |= block.question.empty();
+      no_question |= block.question.empty() && !block.reaching;
       numbers |= block.task == TaskKind::rate && block.answers.empty();
     }
     for (const PageSpec& page : protocol.pages) {

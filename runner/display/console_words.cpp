@@ -69,6 +69,7 @@ std::string state_detail(const ConsoleState& state) {
   if (state.state == "end") return "space bar ends it";
   if (state.state != "homing") return {};
   if (state.sample.waiting == servo::Waiting::for_distance) return "stylus too near: move it away";
+  if (state.sample.waiting == servo::Waiting::for_return) return "stylus must go to the start";
   if (state.sample.waiting == servo::Waiting::for_rest) return "stylus must rest: hold it still";
   return {};
 }

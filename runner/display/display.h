@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -78,6 +79,14 @@ struct Checklist {
   std::vector<std::pair<ConsoleCommand::Kind, std::string>> choices;
 };
 
+/// A movement from home to a target, on the participant's screen. Virtual world, m.
+struct ReachPicture {
+  Vec3 home, target, tip;
+  double home_radius = 0, target_radius = 0;
+  double extent = 0;  ///< from home to the edge of the picture
+  int up = 1;         ///< the axis that points up; x points to the right
+};
+
 /// A page on the participant's screen.
 struct Page {
   enum class Kind {
@@ -103,6 +112,8 @@ struct Page {
   bool wheel = false;       ///< turns of the wheel arrive as keys
   int part = 0, parts = 0;  ///< place in a text of several pages, from 1; 0: a single page
   std::shared_ptr<const std::string> picture{};  ///< a PNG file's bytes, above the text, or null
+  /// Below the text; the target is shown with `go`. None: nothing to reach.
+  std::optional<ReachPicture> reach{};
 };
 
 struct KeyPress {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -228,6 +229,31 @@ void draw_continue(cairo_t* canvas, double middle, double top, double unit) {
   cairo_line_to(canvas, tip, line);
   cairo_line_to(canvas, tip - 0.45 * unit, line + 0.4 * unit);
   cairo_stroke(canvas);
+}
+
+void draw_reach(cairo_t* canvas, const ReachPicture& reach, bool target, double middle, double top,
+                double room) {
+  if (!(room > 0) || !(reach.extent > 0)) return;
+  constexpr double kTipShare = 0.012;  // of the room
+  const double scale = 0.5 * room / reach.extent, middle_up = top + room / 2;
+  const auto circle = [&](const Vec3& place, double radius) {
+    const Vec3 from_home = place - reach.home;
+    cairo_new_sub_path(canvas);
+    cairo_arc(canvas, middle + scale * from_home.x, middle_up - scale * from_home[reach.up], radius,
+              0, 2 * std::numbers::pi);
+  };
+  set_colour(canvas, kQuietInk);
+  cairo_set_line_width(canvas, std::max(1.0, 0.004 * room));
+  circle(reach.home, scale * reach.home_radius);
+  cairo_stroke(canvas);
+  if (target) {
+    set_colour(canvas, kGo);
+    circle(reach.target, scale * reach.target_radius);
+    cairo_fill(canvas);
+  }
+  set_colour(canvas, kText);
+  circle(reach.tip, std::max(2.0, kTipShare * room));
+  cairo_fill(canvas);
 }
 
 double text_width(double width, double unit) { return std::min(0.84 * width, 38 * unit); }

@@ -47,6 +47,9 @@ void draw_checklist(cairo_t* canvas, const Checklist& list, double unit, double 
 /// Draws a PNG file as large as fits, at most at twice its size; a note if it is not a PNG file.
 void draw_picture(cairo_t* canvas, const std::string& bytes, double middle, double top,
                   double width, double room);
+/// Draws home as a ring, the target as a disc, where it is shown, and the tip as a dot.
+void draw_reach(cairo_t* canvas, const ReachPicture& reach, bool target, double middle, double top,
+                double room);
 /// Draws the typed text in a field.
 void draw_typed(cairo_t* canvas, const std::string& typed, double middle, double top, double unit,
                 double width);

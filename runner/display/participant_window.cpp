@@ -120,10 +120,14 @@ class PageLayout {
     } else if (page_.kind == Page::Kind::checklist) {
       draw_checklist(canvas_, page_.checklist, unit_, width_, top_, room_);
     } else {
+      constexpr double kWordsAbove = 0.15;  // share of the room, above a movement's picture
+      const double words = page_.reach ? kWordsAbove * room_ : room_;
+      if (page_.reach)
+        draw_reach(canvas_, *page_.reach, page_.go, width_ / 2, top_ + words, room_ - words);
       const bool large = page_.kind != Page::Kind::message;
       const double letters = page_.kind == Page::Kind::feedback ? 8 : large ? 2.6 : 1.8;
       draw_text(canvas_, page_.text, letters * unit_, kSmallestSize * unit_, width_,
-                text_width(width_, unit_), top_, room_, page_.go ? kGo : kText, large);
+                text_width(width_, unit_), top_, words, page_.go ? kGo : kText, large);
     }
   }
 

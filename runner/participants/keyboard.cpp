@@ -14,6 +14,7 @@
 #include <cstddef>
 #include <cstdio>
 #include <cstring>
+#include <glm/geometric.hpp>
 #include <iterator>
 #include <stdexcept>
 #include <utility>
@@ -34,10 +35,33 @@ constexpr std::int64_t kSteady_ns = 150'000'000;  // debounces the cue at the ed
 using protocols::TaskKind;
 
 constexpr std::int64_t kAskPause_ns = 5'000'000;
+constexpr std::int64_t kPicture_ns = 16'000'000;
 constexpr std::size_t kMostTyped = 200;          // bytes
 constexpr std::int64_t kBurst_ns = 400'000'000;  // keys of one number follow each other faster
 
 using NamedKeys = std::vector<std::pair<std::string, std::string>>;
+
+/// Home and target as the screen shows them.
+display::ReachPicture picture_of(const protocols::ReachingSpec& reaching,
+                                 const protocols::Trial& trial) {
+  const auto farthest = [&](int axis) {
+    double most = 0;
+    for (const Vec3& target : reaching.targets)
+      most = std::max(most, std::abs(target[axis] - reaching.home[axis]));
+    return most;
+  };
+  display::ReachPicture out;
+  out.up = farthest(2) > farthest(1) ? 2 : 1;
+  out.home = reaching.home;
+  out.target = reaching.targets.at(static_cast<std::size_t>(*trial.level) - 1);
+  out.tip = reaching.home;
+  out.home_radius = reaching.home_radius;
+  out.target_radius = reaching.target_radius;
+  for (const Vec3& target : reaching.targets)
+    out.extent = std::max(out.extent, glm::length(target - reaching.home));
+  out.extent += reaching.target_radius;
+  return out;
+}
 
 /// Keys of a page: 1, 2, ..., 9, 0, then letters, each with its text.
 NamedKeys numbered(const std::vector<std::string>& texts) {
@@ -294,12 +318,17 @@ void KeyboardRespondent::show_cue(const servo::Sample& sample) {
   if (sample.phase == servo::Phase::feeling) cue = Cue::go;
   if (sample.waiting == servo::Waiting::for_rest) cue = Cue::ready;
   if (sample.waiting == servo::Waiting::for_distance) cue = Cue::move_away;
+  if (sample.waiting == servo::Waiting::for_return) cue = Cue::go_home;
   if (cue == cue_ || (cue != Cue::go && sample.time_ns - cue_since_ns_ < kSteady_ns)) return;
   cue_ = cue;
   cue_since_ns_ = sample.time_ns;
-  page_.kind = cue == Cue::move_away ? display::Page::Kind::message : display::Page::Kind::neutral;
+  const bool away = cue == Cue::move_away || cue == Cue::go_home;
+  page_.kind = away ? display::Page::Kind::message : display::Page::Kind::neutral;
   page_.go = cue == Cue::go;
-  page_.text = cue == Cue::go ? texts.go : cue == Cue::ready ? texts.ready : texts.move_away;
+  page_.text = cue == Cue::go        ? texts.go
+               : cue == Cue::ready   ? texts.ready
+               : cue == Cue::go_home ? texts.go_home
+                                     : texts.move_away;
   if (cue == Cue::ready) attendant_.sound(SoundCue::ready);
   if (block_ != nullptr) {
     if (cue == Cue::go) page_.text = interval_text();
@@ -310,6 +339,14 @@ void KeyboardRespondent::show_cue(const servo::Sample& sample) {
     page_.wheel =
         cue == Cue::go && block_->task == protocols::TaskKind::adjust && by_ == AnswerBy::keys;
   }
+  screen_.show(page_);
+}
+
+/// Shows where the tip is on its way from home to the target.
+void KeyboardRespondent::show_way(const servo::Sample& sample) {
+  if (!page_.reach || sample.time_ns - way_shown_ns_ < kPicture_ns) return;
+  way_shown_ns_ = sample.time_ns;
+  page_.reach->tip = sample.probe.tip;
   screen_.show(page_);
 }
 
@@ -360,6 +397,7 @@ std::optional<Answer> KeyboardRespondent::step(const servo::Sample& sample) {
     early_ = false;
   }
   show_cue(sample);
+  show_way(sample);
   listen(sample);
   if (pending_ && onset_ns_ > 0 && sample.time_ns >= pending_->time_ns) return pending_;
   attendant_.attend();
@@ -385,14 +423,14 @@ std::optional<std::string> accepted_answer(const protocols::PageItem& item,
   return std::nullopt;
 }
 
-void KeyboardRespondent::begin_interval(const protocols::Trial&, const IntervalView& view) {
+void KeyboardRespondent::begin_interval(const protocols::Trial& trial, const IntervalView& view) {
   view_ = view;
   onset_ns_ = 0;
   buttons_ = 0xFF;
   pending_.reset();
   if (view.continues) return;  // the page stays, and no key press is lost
   keys_.clear();
-  if (view.answers) {
+  if (view.answers && !block_->reaching) {
     for (const protocols::TaskAnswer& answer : block_->answers) {
       const std::string button = "button " + std::to_string(keys_.size() + 1);
       keys_.emplace_back(by_ == AnswerBy::buttons ? button : answer.key, answer.label);
@@ -401,6 +439,8 @@ void KeyboardRespondent::begin_interval(const protocols::Trial&, const IntervalV
   display::Page page;
   page.kind = display::Page::Kind::neutral;
   page.keys = keys_;
+  if (block_->reaching) page.reach = picture_of(*block_->reaching, trial);
+  way_shown_ns_ = 0;
   if (!view.felt) page.text = interval_text();
   show(std::move(page));
   early_ = true;
@@ -417,6 +457,7 @@ std::string KeyboardRespondent::interval_text() const {
     text = std::to_string(view_.interval) + " / " + std::to_string(view_.intervals) + "\n";
   if (!view_.answers) return text + texts.next_interval;
   const protocols::TaskBlock& asked = *block_;
+  if (asked.reaching) return asked.question;
   text += asked.question.empty() ? texts.answer_now : asked.question;
   if (asked.answers.empty()) text += "\n" + texts.type_number + range_text(asked.least, asked.most);
   return text;
@@ -493,6 +534,10 @@ std::optional<Answer> KeyboardRespondent::meaning_in_interval(const std::string&
     return std::nullopt;
   }
   const protocols::TaskBlock& asked = *block_;
+  if (asked.reaching) {  // the movement answers
+    reply();
+    return std::nullopt;
+  }
   if (asked.answers.empty()) return typed_answer(key);
   const bool adjusts = asked.task == TaskKind::adjust;
   const char* const wheel = key == "wheel up" ? "up" : key == "wheel down" ? "down" : "";
@@ -509,7 +554,7 @@ std::optional<Answer> KeyboardRespondent::meaning_in_interval(const std::string&
 
 /// Any button continues; button n stands for the n-th answer.
 void KeyboardRespondent::listen_to_buttons(unsigned pressed, std::int64_t time_ns) {
-  if (pressed == 0) return;
+  if (pressed == 0 || block_->reaching) return;
   Answer answer;
   answer.time_ns = time_ns;
   answer.continues = !view_.answers;

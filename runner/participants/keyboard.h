@@ -74,10 +74,11 @@ class KeyboardRespondent final : public Respondent {
   int seconds_left() const { return page_.seconds_left; }
 
  private:
-  enum class Cue { none, move_away, ready, go };
+  enum class Cue { none, move_away, go_home, ready, go };
   display::Page between_trials(display::Page::Kind kind, const std::string& text) const;
   void show(display::Page page);
   void show_cue(const servo::Sample& sample);
+  void show_way(const servo::Sample& sample);
   void reply();
   void end_reply();
   void wait_until(std::int64_t when_ns);
@@ -126,7 +127,8 @@ class KeyboardRespondent final : public Respondent {
   std::optional<Answer> pending_;  ///< given; waits until the servo's samples reach its time
   const protocols::TaskBlock* block_ = nullptr;  ///< of the trial; may be null
   IntervalView view_;
-  bool early_ = false;  ///< a trial or interval is prepared but cannot be answered yet
+  std::int64_t way_shown_ns_ = 0;  ///< of a movement's picture
+  bool early_ = false;             ///< a trial or interval is prepared but cannot be answered yet
   std::optional<double> least_, most_;     ///< range of the number being typed
   std::vector<display::KeyPress> spoken_;  ///< spoken answers as keys, and keys not handled yet
 };

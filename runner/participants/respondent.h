@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "data/record.h"
 #include "protocols/session_plan.h"
 #include "runner/servo/servo.h"
 
@@ -88,6 +89,8 @@ class Respondent {
                                          const Asking& /*how*/) {
     return "";
   }
+  /// A trial is on record: of this run, or of an earlier one that the session resumes.
+  virtual void recorded(const data::TrialRecord& /*record*/) {}
   /// Called with every sample of the servo. Returns the answer once there is one; answers before
   /// time zero do not count. \throws TrialCutOff if the trial is to be repeated.
   virtual std::optional<Answer> step(const servo::Sample& sample) = 0;

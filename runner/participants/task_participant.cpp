@@ -417,6 +417,7 @@ TaskParticipant::TaskParticipant(const SimulatedSettings& own, const ShapeHypoth
     : protocol_(protocol),
       hand_(own, hypotheses, stylus, protocol, seed, number),
       of_blocks_(of_blocks),
+      reacher_({}, own.hand, stylus, protocol, seed, number),
       judgement_(protocol, {}),
       planned_(std::move(planned)),
       percept_(protocol),
@@ -447,6 +448,7 @@ void TaskParticipant::begin_trial(const protocols::Trial& trial) {
 void TaskParticipant::begin_interval(const protocols::Trial& trial, const IntervalView& view) {
   view_ = view;
   if (!view.felt) return;
+  if (block().reaching) return reacher_.begin(trial);
   if (identifier_ != nullptr) return identifier_->begin_trial(trial);
   percept_.begin(trial, *view.shown);
   judged_ = false;
@@ -491,6 +493,11 @@ std::optional<Answer> TaskParticipant::identify(const servo::Sample& sample) {
 
 std::optional<Answer> TaskParticipant::step(const servo::Sample& sample) {
   if (!view_.felt) return answer(sample.time_ns);
+  if (block().reaching) {
+    reacher_.step(sample);
+    answered_ns_ = sample.time_ns;
+    return std::nullopt;  // the movement answers
+  }
   if (identifier_ != nullptr) return identify(sample);
   if (planned_) return step_as_planned(sample);
   hand_.step(sample);

@@ -1,7 +1,7 @@
 #pragma once
 // A simulated participant for the tasks of version 2. It identifies shapes as SimulatedParticipant
 // does, percept by percept. In all other tasks it explores likewise for a while and judges levels
-// from contact if contact reveals them; the model is given the other levels.
+// from contact if contact reveals them; the model is given the other levels. It reaches as Reacher.
 
 #include <cstdint>
 #include <functional>
@@ -14,6 +14,7 @@
 #include "data/base/random.h"
 #include "protocols/protocol.h"
 #include "protocols/schedule.h"
+#include "runner/participants/reacher.h"
 #include "runner/participants/respondent.h"
 #include "runner/participants/shape_observer.h"
 #include "runner/participants/simulated.h"
@@ -183,6 +184,7 @@ class TaskParticipant final : public Respondent {
   void begin_trial(const protocols::Trial& trial) override;
   void begin_interval(const protocols::Trial& trial, const IntervalView& view) override;
   std::optional<Answer> step(const servo::Sample& sample) override;
+  void recorded(const data::TrialRecord& record) override { reacher_.learn(record); }
   std::optional<Answer> confidence(const protocols::ConfidenceSpec& asked) override;
   std::optional<std::string> ask(const protocols::PageSpec& page, const protocols::PageItem& item,
                                  const Asking& how) override;
@@ -199,6 +201,7 @@ class TaskParticipant final : public Respondent {
   std::map<const ShapeHypotheses*, SimulatedParticipant> identifiers_;
   const BlockHypotheses& of_blocks_;
   SimulatedParticipant* identifier_ = nullptr;  ///< of this trial
+  Reacher reacher_;
   TaskJudgement judgement_;
   JudgementOf planned_;
   JudgementSettings planned_now_;  ///< of this trial

@@ -45,6 +45,7 @@ std::vector<std::string> measures_of(const Protocol& protocol, const TaskBlock& 
       return {to_string(numbers ? PlannedMeasure::exponent : PlannedMeasure::rating)};
     }
     case TaskKind::external:
+    case TaskKind::reach:
       break;
   }
   return {};
@@ -100,14 +101,16 @@ void require_measure(const analysis::PlanRecord& plan, const std::string& path,
     if (block.practice) continue;
     const std::vector<std::string> names = measures_of(protocol, block);
     blocks += (blocks.empty() ? "" : "; ") +
-              (block.name.empty() ? "" : "block '" + block.name + "': ") + analysis::joined(names);
+              (block.name.empty() ? "" : "block '" + block.name + "': ") +
+              (names.empty() ? "none" : analysis::joined(names));
     for (const std::string& name : names) options.insert(option_of(name));
   }
   std::string words;
   for (const std::string& option : options) words += (words.empty() ? "" : " or ") + option;
   throw UsageError(printable(path) + ": expected a plan of a measure that the protocol gives (" +
-                   printable(blocks) + "); this one is of " + measure + ": plan again with " +
-                   words);
+                   printable(blocks) + "); this one is of " + measure +
+                   (words.empty() ? ", and no plan is of the task: palpate bundle needs none"
+                                  : ": plan again with " + words));
 }
 
 /// The stimuli that are identified.

@@ -29,6 +29,7 @@ using protocols::TaskKind;
 struct Kinds {
   bool identify = false, compare = false, two_sided = false, one_sided = false;
   bool same_different = false, detect = false, rate = false, numbers = false, adjust = false;
+  bool reach = false;
   bool confidence = false, catch_trials = false;
 
   bool functions() const { return compare || detect; }
@@ -61,6 +62,9 @@ Kinds kinds_of(const protocols::Protocol& protocol) {
       case TaskKind::adjust:
         out.adjust = true;
         break;
+      case TaskKind::reach:
+        out.reach = true;
+        break;
       case TaskKind::external:
         break;
     }
@@ -86,6 +90,8 @@ std::string question_of(TaskKind task) {
       return "gives a number or a step of a scale";
     case TaskKind::adjust:
       return "turns a number of the stimulus until it feels like the standard";
+    case TaskKind::reach:
+      return "moves the stylus from the start to a target";
     case TaskKind::external:
       break;
   }
@@ -277,6 +283,11 @@ class TaskAnswers final : public StudyAnswers {
     if (kinds_.detect) out.push_back(item("success: whether the answer was yes."));
     if (kinds_.rate || kinds_.numbers) out.push_back(item("number: as answered."));
     if (kinds_.adjust) out.push_back(item("number: the level that was set."));
+    if (kinds_.reach)
+      out.push_back(
+          item("response: in_time, fast or slow, by the block's time window; correct: in time. "
+               "Of the recorded path: deviation, largest_deviation, duration, peak_speed, "
+               "path_ratio, endpoint_error; in clamp trials adaptation."));
     if (kinds_.confidence) out.push_back(item("confidence: the step of its scale."));
     out.push_back(item("timed_out: no answer within the limit."));
     out.push_back(text("codebook.csv explains every column of the data."));
@@ -310,6 +321,11 @@ class TaskAnswers final : public StudyAnswers {
       out.push_back(
           item("PSE: the mean of a participant's settings; constant error: PSE minus "
                "standard."));
+    if (kinds_.reach)
+      out.push_back(
+          item("Deviation: the mean over a participant's trials with the field, at peak speed, "
+               "sideways from the line to the target. Adaptation: the mean over its clamp trials "
+               "of the slope of the channel's sideways force on that of the field."));
     if (kinds_.identify)
       out.push_back(
           item("Share correct, and the mean of the natural logarithms of the response "
@@ -323,6 +339,12 @@ class TaskAnswers final : public StudyAnswers {
     if (kinds_.functions()) put_functions(out);
     if (kinds_.rate) put_ratings(out);
     if (kinds_.numbers || kinds_.adjust) put_log_t_test(out);
+    if (kinds_.reach)
+      out.push_back(
+          text("Course of learning of each participant: end + (start - end) exp(-trial / trials), "
+               "fitted to the deviations over the trials of a block by least squares, where it "
+               "explains at least a tenth of their variance. Means over participants have t "
+               "intervals."));
     if (kinds_.detect || kinds_.same_different)
       out.push_back(
           text("d' and criterion of the group: H = Phi(d'/2 - c), F = Phi(-d'/2 - c) with "
@@ -365,6 +387,7 @@ class TaskAnswers final : public StudyAnswers {
       logs.emplace_back("thresholds whose levels have a logarithmic scale");
     if (kinds_.numbers) logs.emplace_back("exponents");
     if (kinds_.identify) logs.emplace_back("response times");
+    if (kinds_.reach) logs.emplace_back("numbers of trials of learning");
     std::string words =
         logs.empty() ? ""
                      : "Natural logarithms of " + joined(logs) +
@@ -410,7 +433,7 @@ class TaskAnswers final : public StudyAnswers {
 
   std::vector<Paragraph> missing() const override {
     std::vector<Paragraph> out;
-    if (kinds_.functions() || kinds_.rate || kinds_.numbers || kinds_.adjust ||
+    if (kinds_.functions() || kinds_.rate || kinds_.numbers || kinds_.adjust || kinds_.reach ||
         kinds_.same_different)
       out.push_back(item("A trial without an answer is left out and counted" +
                          std::string(study::has_adaptive_blocks(protocol_)

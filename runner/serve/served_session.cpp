@@ -51,6 +51,7 @@ std::string unserved(const protocols::Protocol& protocol) {
     const std::string name = "block '" + block.name + "' ";
     if (block.confidence) return name + "asks for confidence, which needs palpate run";
     if (block.task == TaskKind::adjust) return name + "is an adjustment, which needs palpate run";
+    if (block.reaching) return name + "asks for movements to targets, which need palpate run";
   }
   return "";
 }

@@ -38,6 +38,7 @@ enum class Waiting : std::uint8_t {
   nothing,
   for_distance,  ///< the stylus is not in the home zone
   for_rest,      ///< the stylus is there but has not rested long enough
+  for_return,    ///< the tip is not at the start of a movement
 };
 
 /// The record of one tick.
@@ -65,11 +66,12 @@ inline std::uint8_t recorded_contacts(int contacts) {
 }
 
 /// The home zone, where a trial may start: the whole stylus is at rest outside `radius` about the
-/// origin.
+/// origin, or its tip within `radius` about the start of a movement.
 struct HomeZone {
   double radius = 0.062;     ///< m, bounding sphere and margin
   double rest = 0.5;         ///< s
   double stillness = 0.005;  ///< m; largest distance of the resting tip from where it came to rest
+  std::optional<Vec3> start = std::nullopt;  ///< m, virtual world; none: outside is home
 };
 
 /// Servo-quality figures of one trial, from time zero.

@@ -111,9 +111,11 @@ bool Servo::at_home(const rendering::LineProbe& probe) noexcept {
     rested_ = 0;
     rest_tip_ = tip;
   }
-  if (!(distance_of(*shown_, probe) >= home.radius)) {
+  const bool in_zone = home.start ? glm::length(probe.tip - *home.start) <= home.radius
+                                  : distance_of(*shown_, probe) >= home.radius;
+  if (!in_zone) {
     rested_ = 0;
-    sample_.waiting = Waiting::for_distance;
+    sample_.waiting = home.start ? Waiting::for_return : Waiting::for_distance;
     return false;
   }
   sample_.waiting = Waiting::for_rest;

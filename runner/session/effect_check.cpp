@@ -87,7 +87,7 @@ std::vector<std::string> effect_notes(const stimuli::ObjectSpec& object,
                              " m of the position gives ", one.noise,
                              " N; a longer low pass gives less"));
     }
-    if (field.kind == Kind::viscous && field.destabilising)
+    if (field.destabilising)
       out.push_back(at_field(i, "destabilising") + ": this field may feed energy to the hand");
     if (field.kind == Kind::curl) {
       out.push_back(sentence(at_field(i, "damping_ns_per_m"), ": on a circle, at ", kUsualSpeed,

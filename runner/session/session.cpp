@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <glm/gtc/quaternion.hpp>
 #include <nlohmann/json.hpp>
 #include <utility>
 
@@ -13,6 +14,8 @@
 #include "protocols/schedule.h"
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
+#include "rendering/fields.h"
+#include "runner/session/reach_measures.h"
 #include "runner/session/recorded_outcome.h"
 #include "runner/session/run_record.h"
 
@@ -141,7 +144,8 @@ void Session::report_interval(const protocols::Trial& trial,
 }
 
 std::optional<participants::Answer> Session::wait_in_interval(
-    const participants::IntervalView& view, std::optional<double> limit, ServoState& servo) {
+    const participants::IntervalView& view, std::optional<double> limit, ServoState& servo,
+    const std::function<bool(const servo::Sample&)>& ends) {
   const std::int64_t limit_ns = limit ? std::llround(*limit * kPerSecond_ns) : 0;
   while (true) {
     const servo::Sample& sample = station_.servo.next();
@@ -156,7 +160,12 @@ std::optional<participants::Answer> Session::wait_in_interval(
     if (feeling) record_.response_ns = sample.time_ns;
     const std::optional<participants::Answer> answer = participant_.step(sample);
     const bool over = feeling && limit && sample.time_ns - record_.onset_ns >= limit_ns;
-    const bool meant = answer && answer->continues != view.answers;
+    if (feeling && ends && ends(sample)) {
+      participants::Answer arrived;
+      arrived.time_ns = sample.time_ns;
+      return arrived;
+    }
+    const bool meant = answer && answer->continues != view.answers && !ends;
     if (meant && (!limit || answer->time_ns - record_.onset_ns < limit_ns)) return answer;
     if (over) return std::nullopt;
   }
@@ -175,6 +184,8 @@ std::optional<participants::Answer> Session::show_intervals(const protocols::Tri
   std::optional<participants::Answer> answer;
   if (block.task == TaskKind::adjust) {
     answer = adjust(trial, servo);
+  } else if (block.reaching) {
+    answer = reach(trial, servo);
   } else {
     const auto count = static_cast<int>(trial.intervals.size());
     for (int i = 0; i < count; ++i) {
@@ -198,6 +209,46 @@ std::optional<participants::Answer> Session::show_intervals(const protocols::Tri
     ask_confidence(*block.confidence);
   }
   return answer;
+}
+
+/// The movement gives the answer: it ends when the tip rests in the target.
+std::optional<participants::Answer> Session::reach(const protocols::Trial& trial,
+                                                   ServoState& servo) {
+  const protocols::TaskBlock& block = task_of(trial);
+  const protocols::ReachingSpec& reaching = *block.reaching;
+  const Vec3 target = reaching.targets.at(static_cast<std::size_t>(*trial.level) - 1);
+  const double period = 1 / station_.protocol.servo_rate;
+  const participants::IntervalView view{1, 1, true, true, &trial.intervals.front()};
+  report_interval(trial, view);
+  servo::HomeZone home{reaching.home_radius, station_.protocol.home.rest};
+  home.start = reaching.home;
+  prepare_interval(trial, trial.intervals.front(), home);
+  RestInTarget target_reached(target, reaching.target_radius, period);
+  std::optional<participants::Answer> answer = wait_in_interval(
+      view, block.time_out, servo,
+      [&](const servo::Sample& sample) { return target_reached.rests(sample.probe.tip); });
+  if (servo.tripped()) return std::nullopt;
+  end_interval();
+  record_.task.reach =
+      reach_measures(record_.samples, trial.reach, target, period, field_of(trial));
+  if (answer) answer->stimulus = timing_of(block, *record_.task.reach);
+  return answer;
+}
+
+/// The fields of the trial's stimulus, also where a channel or nothing takes their place.
+FieldOfReach Session::field_of(const protocols::Trial& trial) const {
+  const auto& object = station_.protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].object;
+  const Quat to_world = object.pose.orientation;
+  return [this, &object, to_world](const data::SampleRecord& sample, const Vec3& velocity) {
+    const Vec3 tip(sample.tip[0], sample.tip[1], sample.tip[2]);
+    const Vec3 place = glm::conjugate(to_world) * (tip - object.pose.position);
+    const double time = sample.tick / station_.protocol.servo_rate;
+    Vec3 force(0);
+    for (const stimuli::FieldSpec& field : object.fields)
+      force +=
+          rendering::field_force(field, place, glm::conjugate(to_world) * velocity, time, false);
+    return to_world * force;
+  };
 }
 
 /// Asks for the answer after the last interval, with forces off.
@@ -293,6 +344,10 @@ void Session::judge(const protocols::Trial& trial, const participants::Answer& a
     case TaskKind::external:
       record_.response = chosen(block, answer).name;
       record_.correct = task.success = answer.correct.value_or(names_what_is_asked(trial, record_));
+      break;
+    case TaskKind::reach:
+      record_.response = chosen(block, answer).name;
+      record_.correct = task.success = record_.response == "in_time";
       break;
     case TaskKind::rate:
       task.number = block.answers.empty() ? answer.number : chosen(block, answer).number;
@@ -467,6 +522,7 @@ void Session::step() {
     case State::response:
       station_.log.finish(record_);
       if (events_ != nullptr) events_->recorded(record_);
+      participant_.recorded(record_);
       report_level();
       give_feedback();
       state_ = before_trial();

@@ -2,6 +2,7 @@
 // The trial loop: a session as a state machine, the same for simulated and live participants.
 
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <string>
 #include <utility>
@@ -10,6 +11,7 @@
 #include "protocols/session_plan.h"
 #include "runner/participants/respondent.h"
 #include "runner/session/live_forces.h"
+#include "runner/session/reach_measures.h"
 #include "runner/session/session_end.h"
 #include "runner/session/session_events.h"
 #include "runner/session/session_scenes.h"
@@ -61,15 +63,18 @@ class Session {
   void plan_task(const protocols::Trial& trial, data::TrialRecord& record) const;
   std::optional<participants::Answer> show_intervals(const protocols::Trial& trial,
                                                      ServoState& servo);
+  std::optional<participants::Answer> reach(const protocols::Trial& trial, ServoState& servo);
+  FieldOfReach field_of(const protocols::Trial& trial) const;
   std::optional<participants::Answer> adjust(const protocols::Trial& trial, ServoState& servo);
   std::optional<participants::Answer> ask_without_forces(const protocols::Trial& trial,
                                                          ServoState& servo);
   void prepare_interval(const protocols::Trial& trial, const protocols::Interval& interval,
                         const servo::HomeZone& home);
   servo::HomeZone home_of(const protocols::Interval& interval, double rest) const;
-  std::optional<participants::Answer> wait_in_interval(const participants::IntervalView& view,
-                                                       std::optional<double> limit,
-                                                       ServoState& servo);
+  /// \param ends  whether the movement has ended at a sample; empty: the participant answers
+  std::optional<participants::Answer> wait_in_interval(
+      const participants::IntervalView& view, std::optional<double> limit, ServoState& servo,
+      const std::function<bool(const servo::Sample&)>& ends = {});
   void end_interval();
   void report_interval(const protocols::Trial& trial, const participants::IntervalView& view);
   void judge(const protocols::Trial& trial, const participants::Answer& answer);

@@ -64,7 +64,8 @@ struct Work {
   std::int64_t clock_ns = 0;                     ///< the session's clock at its last record
   data::RunInfo info;
   std::vector<data::PageAnswer> page_answers;
-  std::vector<data::TrialRecord> completed;  ///< for an advisor that proposes levels
+  std::vector<data::TrialRecord>
+      completed;  ///< for an advisor that proposes levels, and a hand that learns
 };
 
 /// Carries records from the workers to the thread that owns the store.
@@ -174,7 +175,7 @@ void run_session(const SimulatedStudy& study, const Work& work, std::size_t inde
   QueueLog log(queue, index, work.page_answers);
   run_simulated_session(study,
                         {work.participant.enrolled_number, plan_of(study.protocol, work),
-                         work.clock_ns, work.info.clock, advisor.get()},
+                         work.clock_ns, work.info.clock, advisor.get(), work.completed},
                         log, halting);
 }
 
@@ -213,7 +214,10 @@ std::vector<Work> unfinished_work(const protocols::Protocol& protocol, data::Sto
       }
       for (const data::TrialRecord& record : before.completed)
         work.answers.push_back(outcome_of(record));
-      if (!plan.advisor.empty()) work.completed = before.completed;
+      const bool learns = std::ranges::any_of(shown.blocks, [](const protocols::TaskBlock& block) {
+        return block.reaching.has_value();
+      });
+      if (!plan.advisor.empty() || learns) work.completed = before.completed;
       work.clock_ns = before.latest_ns;
       work.info = simulated_run(shown, settings, number, session);
       if (!shown.pages.empty()) work.page_answers = store.answers_in_force(participant, session);
@@ -369,6 +373,7 @@ void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& 
   }
   const Station station{protocol, study.library, session.plan, servo,
                         clock,    session.utc,   log,          session.advisor};
+  for (const data::TrialRecord& record : session.completed) participant->recorded(record);
   Session trials(station, *participant);
   // A shown trial is recorded, even if the run stops after it.
   while (trials.state() != Session::State::end &&

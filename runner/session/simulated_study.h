@@ -49,6 +49,7 @@ struct SimulatedSession {
   std::int64_t clock_ns = 0;  ///< start of its clock
   data::ClockStamp utc;
   LevelAdvisor* advisor = nullptr;
+  std::vector<data::TrialRecord> completed = {};  ///< in earlier runs; only of a task that learns
 };
 
 /// \param halting  asked between trials; a shown trial is finished

@@ -27,7 +27,18 @@ struct ListedTrial {
   std::string stimulus, level;
   int comparison = 0;
   bool example = false;  ///< depends on answers
+  std::string kind;      ///< reach: "field", "catch", "clamp"
 };
+
+bool has_reaches(const protocols::Protocol& protocol) {
+  return std::ranges::any_of(protocol.blocks, [](const auto& b) { return b.reaching.has_value(); });
+}
+
+/// What the table shows as the level: of a reach, the target and what is felt on the way.
+std::string shown_level(const ListedTrial& row) {
+  if (row.kind.empty()) return row.trial.catch_trial ? "catch" : row.level;
+  return row.level + (row.trial.reach == protocols::ReachTrial::field ? "" : " " + row.kind);
+}
 
 using protocols::level_text;
 
@@ -38,7 +49,8 @@ ListedTrial listed(const protocols::Protocol& protocol, const protocols::Trial& 
           protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name,
           trial.level ? protocols::level_text(*trial.level) : "",
           comparison_interval(block, trial),
-          protocols::is_adaptive(block)};
+          protocols::is_adaptive(block),
+          block.reaching ? to_string(trial.reach) : ""};
 }
 
 std::string table_text(const protocols::Protocol& protocol,
@@ -59,7 +71,7 @@ std::string table_text(const protocols::Protocol& protocol,
     }
     out << "  " << std::right << std::setw(5) << trial.trial << std::setw(7) << trial.track << "  "
         << std::left << std::setw(8) << protocols::to_string(trial.renderer) << "  "
-        << std::setw(12) << (trial.catch_trial ? "catch" : row.level) << "  " << std::setw(10)
+        << std::setw(12) << shown_level(row) << "  " << std::setw(10)
         << (row.comparison > 0 ? std::to_string(row.comparison) : "") << "  " << row.stimulus
         << "\n";
   }
@@ -73,6 +85,7 @@ std::string csv_text(const protocols::Protocol& protocol, int participant,
        {"task", "block_name", "track", "level", "catch_trial", "comparison_interval", "example"})
     columns.emplace_back(more);
   for (const protocols::Factor& factor : protocol.factors) columns.push_back(factor.name);
+  if (has_reaches(protocol)) columns.emplace_back("reach_kind");
   output::CsvText table(columns, "\r\n");
   for (const protocols::Trial& trial : trials) {
     const ListedTrial row = listed(protocol, trial);
@@ -85,6 +98,7 @@ std::string csv_text(const protocols::Protocol& protocol, int participant,
           << row.example;
     for (const protocols::Factor& factor : protocol.factors)
       table << cell_name(row.stimulus).level(factor.name);
+    if (has_reaches(protocol)) table << row.kind;
     table.end_row();
   }
   return table.text();
@@ -113,6 +127,7 @@ std::string json_text(const protocols::Protocol& protocol, int participant,
     for (const auto& [factor, level] : cell_name(row.stimulus).levels)
       out["factors"][factor] = level;
     if (trial.level) out["level"] = *trial.level;
+    if (!row.kind.empty()) out["reach_kind"] = row.kind;
     if (row.comparison > 0) out["comparison_interval"] = row.comparison;
     rows.push_back(std::move(out));
   }
@@ -326,6 +341,18 @@ std::vector<std::string> in_words(const protocols::Protocol& protocol,
         head += (level == crossed.levels.front() ? "" : ", ") + factor.levels[level].name;
       head += ")";
     }
+  }
+  if (block.reaching) {
+    const protocols::ReachingSpec& reaching = *block.reaching;
+    head += "; " + std::to_string(reaching.targets.size()) +
+            (reaching.targets.size() == 1 ? " target" : " targets");
+    if (reaching.most_time)
+      head += " in " + level_text(*reaching.least_time) + " to " + level_text(*reaching.most_time) +
+              " s";
+    if (reaching.clamp_share > 0)
+      head += "; " + level_text(100 * reaching.clamp_share) + " % clamp trials";
+    if (reaching.catch_share > 0)
+      head += "; " + level_text(100 * reaching.catch_share) + " % catch trials";
   }
   if (block.catch_trials > 0)
     head += "; " + level_text(100 * block.catch_trials) + " % catch trials";

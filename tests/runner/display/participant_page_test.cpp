@@ -1,8 +1,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
+#include <numbers>
 #include <tuple>
 #include <utility>
 #include <vector>
@@ -67,6 +69,41 @@ TEST(ParticipantPage, TheSamePageGivesTheSamePixels) {
   keep(a, "neutral");
   EXPECT_EQ(a.pixels, b.pixels);
   EXPECT_GT(inked_rows(a), 30);
+}
+
+TEST(ParticipantPage, AMovementShowsHomeTipAndItsTargetAtGo) {
+  Page page;
+  page.kind = Page::Kind::neutral;
+  page.reach = ReachPicture{.home = {0, -0.04, 0},
+                            .target = {0.05, 0.02, 0},
+                            .tip = {0, -0.04, 0},
+                            .home_radius = 0.005,
+                            .target_radius = 0.005,
+                            .extent = 0.083};
+  const Image before = draw_page(page, 1280, 800);
+  page.go = true;
+  const Image go = draw_page(page, 1280, 800);
+  keep(go, "reach");
+  EXPECT_TRUE(border_is_clear(go));
+  // The target appears to the right of home and above it.
+  double x = 0, y = 0, inked = 0;
+  for (int row = 0; row < go.height; ++row) {
+    for (int column = 0; column < go.width; ++column) {
+      const auto at = static_cast<std::size_t>(row) * go.width + column;
+      if (go.pixels[at] == before.pixels[at]) continue;
+      x += column;
+      y += row;
+      ++inked;
+    }
+  }
+  ASSERT_GT(inked, 100);
+  // The disc's area gives the scale; its middle is 5 cm to the right of home, in the middle.
+  const double scale = std::sqrt(inked / std::numbers::pi) / 0.005;
+  EXPECT_NEAR((x / inked - go.width / 2.0) / scale, 0.05, 0.002);
+  page.reach->tip = {0.03, -0.02, 0};
+  EXPECT_NE(draw_page(page, 1280, 800).pixels, go.pixels);
+  page.reach->up = 2;
+  EXPECT_NE(draw_page(page, 1280, 800).pixels, go.pixels);
 }
 
 TEST(ParticipantPage, ATrialShowsItsWordAndTheKeyMap) {

@@ -109,6 +109,38 @@ class KeyboardTasks : public ::testing::Test {
   Asking how_;
 };
 
+TEST_F(KeyboardTasks, AMovementShowsItsTargetAndTakesNoKey) {
+  protocol_ = protocols::parse_protocol(PALPATE_SOURCE_DIR "/tests/protocols/good/reach-v2.json");
+  person();
+  trial_.level = 2;
+  const protocols::Interval shown{0, protocols::RendererKind::point};
+  begin(0, {1, 1, true, true, &shown});
+  EXPECT_TRUE(screen_.pages.back().keys.empty());
+  servo::Sample away = felt();
+  away.phase = servo::Phase::homing;
+  away.waiting = servo::Waiting::for_return;
+  away.time_ns += 200'000'000;
+  person_->step(away);
+  EXPECT_EQ(screen_.pages.back().text, protocol_.texts.go_home);
+  screen_.type("1 1 ");
+  clock_.wait_until(clock_.now_ns() + 300'000'000);
+  for (int i = 0; i < 100; ++i) {
+    servo::Sample sample = felt();
+    sample.probe.tip = {0.001 * i, 0.01, 0};
+    EXPECT_FALSE(person_->step(sample));
+    clock_.wait_until(clock_.now_ns() + 1'000'000);
+  }
+  const display::Page& page = screen_.pages.back();
+  ASSERT_TRUE(page.reach);
+  EXPECT_TRUE(page.go);
+  EXPECT_EQ(page.reach->target, Vec3(0.05, 0, 0));
+  EXPECT_EQ(page.reach->home, Vec3(0, -0.03, 0));
+  EXPECT_GT(page.reach->tip.x, 0.08);
+  // The targets differ in y and z, most in y.
+  EXPECT_EQ(page.reach->up, 1);
+  EXPECT_NEAR(page.reach->extent, 0.08 + 0.006, 1e-12);
+}
+
 TEST_F(KeyboardTasks, NumbersAreTypedWithPointCommaMinusAndBackspace) {
   for (const auto& [typed, number] : std::vector<std::pair<std::string, double>>{{"12.5\n", 12.5},
                                                                                  {"7,25\n", 7.25},
