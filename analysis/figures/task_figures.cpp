@@ -1,8 +1,10 @@
 #include <algorithm>
 #include <cmath>
+#include <glm/common.hpp>
 #include <iterator>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -663,6 +665,149 @@ void add_magnitude_figures(const StudyAnalysis& analysis, std::vector<Figure>& f
   }
 }
 
+/// A measure of movements over the trials of their block.
+struct ReachCourse {
+  const char* title;
+  std::vector<ReachPoint> Reaches::*points;
+  double factor;  ///< of the drawn value
+};
+constexpr ReachCourse kDeviation{"deviation at peak speed (mm)", &Reaches::deviations, 1e3};
+constexpr ReachCourse kCatches{"", &Reaches::catches, 1e3};
+constexpr ReachCourse kAdaptation{"adaptation", &Reaches::adaptations, 1};
+
+/// Means over participants in runs of trials, drawn at the middle of each.
+void add_means(Panel& panel, const TaskCell& cell, const ReachCourse& course, double run, Role role,
+               MarkerShape shape) {
+  std::map<int, std::vector<double>> values;
+  for (const Reaches& one : cell.reaches) {
+    for (const ReachPoint& point : one.*course.points)
+      values[static_cast<int>(point.trial / run)].push_back(course.factor * point.value);
+  }
+  Mark line = line_mark(role, {}, {}, 3);
+  for (const auto& [number, own] : values) {
+    double mean = 0;
+    for (const double value : own) mean += value / static_cast<double>(own.size());
+    const double at = (number + 0.5) * run + 0.5;
+    line.x.push_back(at);
+    line.y.push_back(mean);
+    panel.marks.push_back(symbol(role, shape, at, mean, 4,
+                                 "mean of " + counted(own.size(), "trial", "trials") + " about " +
+                                     short_number(at) + ": " + short_number(mean)));
+  }
+  if (line.x.size() > 1) panel.marks.push_back(std::move(line));
+}
+
+Panel reach_panel(const TaskCell& cell, std::size_t renderer, const ReachCourse& course) {
+  const auto [role, shape] = group_style(cell.renderer, renderer);
+  double low = 0, high = 0, last = 1;
+  Panel panel;
+  const auto add_points = [&](const Reaches& one, const ReachCourse& of, MarkerShape marker) {
+    for (const ReachPoint& point : one.*of.points) {
+      const double value = of.factor * point.value;
+      low = std::min(low, value);
+      high = std::max(high, value);
+      last = std::max(last, point.trial + 1);
+      Mark dot = symbol(Role::soft, marker, point.trial + 1, value, 1.8);
+      dot.opacity = 0.6;
+      dot.participant = printable(cell.participants[one.participant], 40);
+      dot.text =
+          dot.participant + ", trial " + short_number(point.trial + 1) + ": " + short_number(value);
+      panel.marks.push_back(std::move(dot));
+    }
+  };
+  const bool deviations = course.points == kDeviation.points;
+  for (const Reaches& one : cell.reaches) {
+    add_points(one, course, shape);
+    if (deviations) add_points(one, kCatches, MarkerShape::saltire);
+  }
+  constexpr double kRuns = 20;  // of trials, whose means are drawn
+  add_means(panel, cell, course, std::max(1.0, std::ceil(last / kRuns)), role, shape);
+  const double margin = 0.05 * std::max(high - low, 1e-3);
+  panel.title = printable(cell.renderer, 40);
+  panel.x = linear_axis(0, last + 1, "trial of the block");
+  panel.y = linear_axis(low - margin, high + margin, course.title);
+  panel.width = 360;
+  panel.height = 260;
+  return panel;
+}
+
+/// The first movements and the last, from above, or from the front where they rise more than they
+/// go away.
+std::optional<Panel> path_panel(const TaskCell& cell, std::size_t renderer) {
+  Vec3 low(std::numeric_limits<double>::infinity()), high(-low);
+  for (const Reaches& one : cell.reaches) {
+    for (const auto* paths : {&one.first_paths, &one.last_paths}) {
+      for (const std::vector<Vec3>& path : *paths) {
+        for (const Vec3& place : path) {
+          low = glm::min(low, place);
+          high = glm::max(high, place);
+        }
+      }
+    }
+  }
+  if (!(low.x <= high.x)) return std::nullopt;
+  const int up = high.z - low.z > high.y - low.y ? 2 : 1;
+  Panel panel;
+  const auto add = [&](const Reaches& one, const std::vector<Vec3>& path, Role role,
+                       const char* when) {
+    Mark line = line_mark(role, {}, {}, 1.4);
+    line.opacity = 0.7;
+    line.participant = printable(cell.participants[one.participant], 40);
+    line.text = line.participant + ", " + when;
+    for (const Vec3& place : path) {
+      line.x.push_back(1e3 * place.x);
+      line.y.push_back(1e3 * place[up]);
+    }
+    panel.marks.push_back(std::move(line));
+  };
+  const auto [role, shape] = group_style(cell.renderer, renderer);
+  for (const Reaches& one : cell.reaches) {
+    for (const auto& path : one.first_paths) add(one, path, Role::amber, "one of the first");
+    for (const auto& path : one.last_paths) add(one, path, role, "one of the last");
+  }
+  // One scale for both axes.
+  const double wide = 1e3 * (high.x - low.x), tall = 1e3 * (high[up] - low[up]);
+  const double half = 0.55 * std::max({wide, tall, 1.0});
+  const double x = 500 * (low.x + high.x), y = 500 * (low[up] + high[up]);
+  panel.title = printable(cell.renderer, 40);
+  panel.x = linear_axis(x - half, x + half, "to the right (mm)");
+  panel.y = linear_axis(y - half, y + half, up == 1 ? "away (mm)" : "up (mm)");
+  panel.width = panel.height = 260;
+  return panel;
+}
+
+void add_reach_figures(const StudyAnalysis& analysis, std::vector<Figure>& figures) {
+  const auto has = [](const TaskCell& cell) { return !cell.reaches.empty(); };
+  std::size_t number = 0;
+  for (const CellList& cells : grouped_cells<std::pair<std::string, std::string>>(
+           analysis, has,
+           [](const TaskCell& cell) { return std::pair(cell.block_name, cell.shape); })) {
+    const TaskCell& first = *cells.front();
+    Figure figure = new_task_figure(analysis, "reach" + std::to_string(++number),
+                                    "Movements over the trials", first, first.shape);
+    for (std::size_t r = 0; r < cells.size(); ++r) {
+      figure.panels.push_back(reach_panel(*cells[r], r, kDeviation));
+      const bool clamped = std::ranges::any_of(
+          cells[r]->reaches, [](const Reaches& one) { return !one.adaptations.empty(); });
+      if (clamped) figure.panels.push_back(reach_panel(*cells[r], r, kAdaptation));
+      if (auto paths = path_panel(*cells[r], r)) figure.panels.push_back(std::move(*paths));
+      for (const Reaches& one : cells[r]->reaches) {
+        figure.description += printable(cells[r]->participants[one.participant]) + ": deviation " +
+                              (one.deviation ? short_number(1e3 * *one.deviation) : "unknown") +
+                              " mm";
+        if (one.adaptation) figure.description += ", adaptation " + short_number(*one.adaptation);
+        figure.description += ". ";
+      }
+    }
+    figure.notes.push_back(
+        "Small: single trials of all participants; crosses: catch trials, without the field. Bold: "
+        "means of all participants over runs of trials. Adaptation: of clamp trials; 1 is the push "
+        "that the field would have needed. Paths: each participant's first (amber) and last "
+        "movements with the field, from databases only.");
+    figures.push_back(std::move(figure));
+  }
+}
+
 Figure figure_of(const StudyAnalysis& analysis, const TaskCell& cell, std::string id,
                  const std::string& what) {
   Figure figure = new_task_figure(analysis, std::move(id), what, cell, cell.shape);
@@ -681,6 +826,7 @@ std::vector<Figure> task_figures(const StudyAnalysis& analysis) {
   add_design_figures(analysis, figures);
   add_rating_figures(analysis, figures);
   add_magnitude_figures(analysis, figures);
+  add_reach_figures(analysis, figures);
   std::size_t number = 0;
   for (const TaskCell& cell : analysis.cells) {
     if (cell.functions.empty()) continue;

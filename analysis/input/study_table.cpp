@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -40,7 +41,8 @@ const std::vector<std::string_view> kTaskColumns{
     "simulated",       "session",       "block",           "trial",
     "response_time",   "protocol_name", "protocol_sha256", "comparison_interval",
     "interval_onsets", "torque_driven", "program_version", "group"};
-const char* const kTasks[] = {"identify", "compare", "detect", "rate", "adjust", "external"};
+const char* const kTasks[] = {"identify", "compare",  "detect", "rate",
+                              "adjust",   "external", "reach"};
 
 /// \param twice  receives the names of known columns that come again; nullptr: they do not matter
 Columns read_header(CsvReader& reader, std::vector<std::string>* twice = nullptr) {
@@ -211,6 +213,22 @@ void warn_of_unread(const std::vector<std::string>& found, const std::vector<std
                            "named by the protocol (--design).");
 }
 
+/// The measures of a movement; none: another task.
+std::optional<data::ReachRecord> read_reach(TaskRow& row) {
+  if (row.value("task") != "reach") return std::nullopt;
+  data::ReachRecord reach;
+  reach.kind = row.value("reach_kind");
+  reach.duration = row.number("duration");
+  reach.peak_speed = row.number("peak_speed");
+  reach.deviation = row.number("deviation");
+  reach.largest_deviation = row.number("largest_deviation");
+  reach.path_ratio = row.number("path_ratio");
+  reach.endpoint_error = row.number("endpoint_error");
+  reach.side_force = row.number("side_force");
+  reach.adaptation = row.number("adaptation");
+  return reach;
+}
+
 StudyTrial read_trial(TaskRow& row, const std::vector<std::string>& factors) {
   StudyTrial trial;
   trial.participant = row.text("participant_id");
@@ -230,6 +248,7 @@ StudyTrial read_trial(TaskRow& row, const std::vector<std::string>& factors) {
   trial.number = row.number("number");
   take_rated_number(trial);
   trial.confidence = row.number("confidence");
+  trial.reach = read_reach(row);
   trial.catch_trial = row.yes("catch_trial");
   trial.success = row.yes("success");
   if (!row.value("correct").empty()) trial.correct = row.yes("correct");
@@ -249,7 +268,7 @@ StudyTrial read_trial(TaskRow& row, const std::vector<std::string>& factors) {
         row.hint("success") + row.hint("comparison_interval"));
   if (trial.participant.empty()) row.add_fault("participant_id", "expected a participant");
   if (std::find(std::begin(kTasks), std::end(kTasks), trial.task) == std::end(kTasks))
-    row.add_fault("task", "expected identify, compare, detect, rate, adjust or external");
+    row.add_fault("task", "expected identify, compare, detect, rate, adjust, external or reach");
   return trial;
 }
 
@@ -504,7 +523,7 @@ StudyTable read_tasks_store(data::Store& store, const std::string& protocol) {
   const data::TorqueNotes torque_notes(store);
   const data::ParticipantGroups groups(store);
   TorqueCounts torque;
-  store.for_each_trial([&](const data::StoredTrial& stored) {
+  const auto visit = [&](const data::StoredTrial& stored) {
     if (!is_protocol(protocol, stored.protocol_name, stored.protocol_sha256)) return;
     const std::pair known(stored.protocol_name, stored.protocol_sha256);
     if (std::find(table.protocols.begin(), table.protocols.end(), known) == table.protocols.end())
@@ -524,7 +543,10 @@ StudyTable read_tasks_store(data::Store& store, const std::string& protocol) {
       note_once(stored.run.program_version, table.provenance.program_versions);
       note_once(stored.run.observer_sha256, observers);
     }
-  });
+  };
+  const std::function<bool(const data::StoredTrial&)> has_path =
+      [](const data::StoredTrial& stored) { return stored.record.task.reach.has_value(); };
+  store.for_each_trial(visit, has_path);
   std::vector<ProtocolText> protocols;
   for (const data::ProtocolInfo& one : store.protocols()) {
     if (is_protocol(protocol, one.name, one.sha256))
@@ -594,6 +616,22 @@ void put_protocols(const std::vector<ProtocolText>& protocols, const std::string
   note_factors_of_trials(table);
 }
 
+namespace {
+
+/// Some kPlaces places of the tip.
+std::vector<Vec3> path_of(const data::TrialRecord& record) {
+  constexpr std::size_t kPlaces = 80;
+  std::vector<Vec3> path;
+  const std::size_t every = std::max<std::size_t>(1, record.samples.size() / kPlaces);
+  for (std::size_t i = 0; i < record.samples.size(); i += every) {
+    const auto& tip = record.samples[i].tip;
+    path.emplace_back(tip[0], tip[1], tip[2]);
+  }
+  return path;
+}
+
+}  // namespace
+
 StudyTrial study_trial_of(const std::string& participant, const data::TrialRecord& record) {
   StudyTrial trial;
   trial.participant = participant;
@@ -608,6 +646,8 @@ StudyTrial study_trial_of(const std::string& participant, const data::TrialRecor
   trial.standard_level = record.task.standard_level;
   trial.number = record.task.number;
   trial.confidence = record.task.confidence;
+  trial.reach = record.task.reach;
+  if (trial.reach) trial.path = path_of(record);
   trial.catch_trial = record.task.catch_trial;
   trial.success = record.task.success;
   trial.intervals = static_cast<int>(record.task.intervals.size());

@@ -4,8 +4,10 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "data/record.h"
+#include "stimuli/vec.h"
 
 namespace palpate::analysis {
 
@@ -21,10 +23,12 @@ struct StudyTrial {
   int session = 1, block = 1, trial = 1;
   bool practice = false;  ///< left out of tables
   bool timed_out = false, simulated = false;
-  int intervals = 0;                    ///< compare: number of intervals; 0: unknown
-  std::string protocol_sha256;          ///< "": unknown
-  std::optional<double> response_time;  ///< s; none: not in the source
-  std::size_t line = 0;                 ///< of the file, from 1; 0: none
+  int intervals = 0;                       ///< compare: number of intervals; 0: unknown
+  std::string protocol_sha256;             ///< "": unknown
+  std::optional<double> response_time;     ///< s; none: not in the source
+  std::optional<data::ReachRecord> reach;  ///< reach: its measures
+  std::vector<Vec3> path;                  ///< reach: m, of the tip, for figures; empty: unknown
+  std::size_t line = 0;                    ///< of the file, from 1; 0: none
 };
 
 /// Converts a stored completed trial.

@@ -232,6 +232,37 @@ TaskJson information_json(const InformationTransfer& transfer) {
           {"categories", maybe(transfer.categories)}};
 }
 
+TaskJson points_json(const std::vector<ReachPoint>& points) {
+  TaskJson out = TaskJson::array();
+  for (const ReachPoint& one : points) out.push_back({one.trial + 1, one.value});
+  return out;
+}
+
+TaskJson reaches_json(const TaskCell& cell, const Reaches& one) {
+  TaskJson out{{"participant_id", cell.participants[one.participant]},
+               {"n_trials", one.trials},
+               {"n_in_time", one.in_time},
+               {"deviation_m", maybe(one.deviation)},
+               {"catch_deviation_m", maybe(one.catch_deviation)},
+               {"adaptation", maybe(one.adaptation)},
+               {"duration_s", maybe(one.duration)},
+               {"path_ratio", maybe(one.path_ratio)},
+               {"endpoint_error_m", maybe(one.endpoint_error)}};
+  TaskJson& learning = out["learning"];
+  if (one.learning.undefined.empty())
+    learning = {{"status", "ok"},
+                {"start_m", one.learning.start},
+                {"end_m", one.learning.end},
+                {"trials", one.learning.trials},
+                {"residual_sd_m", one.learning.residual_sd}};
+  else
+    learning = {{"status", "undefined"}, {"reason", one.learning.undefined}};
+  out["deviations"] = points_json(one.deviations);
+  out["catch_deviations"] = points_json(one.catches);
+  out["adaptations"] = points_json(one.adaptations);
+  return out;
+}
+
 TaskJson cell_json(const TaskCell& cell) {
   TaskJson out{{"task", cell.task},
                {"block_name", cell.block_name},
@@ -262,6 +293,7 @@ TaskJson cell_json(const TaskCell& cell) {
                                   {"sd", maybe(one.sd)},
                                   {"jnd", maybe(one.jnd)},
                                   {"start_effect", maybe(one.start_effect)}});
+  for (const Reaches& one : cell.reaches) out["reaches"].push_back(reaches_json(cell, one));
   if (cell.information) {
     TaskJson& bits = out["information_transfer"] = information_json(*cell.information);
     bits["most_bits"] = finite(cell.information_most);

@@ -509,6 +509,33 @@ Table settings_table(const TaskCell& cell, const std::string& label) {
   return table;
 }
 
+Table reaches_table(const TaskCell& cell, const std::string& label) {
+  Table table = table_of(cell, "Movements", label,
+                         {"participant", "trials", "in time", "deviation (mm)", "catch (mm)",
+                          "adaptation", "start (mm)", "end (mm)", "trials of learning",
+                          "duration (s)", "path / chord", "end's error (mm)"});
+  const auto millimetres = [](const std::optional<double>& metres) {
+    return short_or_missing(metres ? std::optional(1e3 * *metres) : std::nullopt);
+  };
+  for (const Reaches& one : cell.reaches) {
+    const LearningFit& fit = one.learning;
+    const bool fitted = fit.undefined.empty();
+    const auto of_fit = [&](double value) { return fitted ? std::optional(value) : std::nullopt; };
+    table.rows.push_back({cell.participants[one.participant], std::to_string(one.trials),
+                          std::to_string(one.in_time), millimetres(one.deviation),
+                          millimetres(one.catch_deviation), short_or_missing(one.adaptation),
+                          millimetres(of_fit(fit.start)), millimetres(of_fit(fit.end)),
+                          short_or_missing(of_fit(fit.trials)), short_or_missing(one.duration),
+                          short_or_missing(one.path_ratio), millimetres(one.endpoint_error)});
+  }
+  table.notes = {
+      "Deviation: mean at peak speed in trials with the field, to the left of the line to the "
+      "target. Adaptation: mean over clamp trials of the slope of the channel's sideways force on "
+      "that of the field. Start, end and trials of learning: of an exponential fitted to the "
+      "deviations over the trials of the block, where they have a course."};
+  return table;
+}
+
 std::vector<std::string> spread_cells(const RatingSpread& spread) {
   return {short_number(spread.median), short_number(spread.lower_quartile),
           short_number(spread.upper_quartile), short_number(spread.mean),
@@ -736,7 +763,8 @@ std::vector<Table> cell_tables(const TaskCell& cell, const std::string& label) {
                             rated_levels_table(cell, label),
                             exponents_table(cell, label),
                             magnitudes_table(cell, label),
-                            settings_table(cell, label)};
+                            settings_table(cell, label),
+                            reaches_table(cell, label)};
   std::erase_if(tables, [](const Table& table) { return table.rows.empty(); });
   return tables;
 }

@@ -177,6 +177,24 @@ std::string adjustment_text(const TaskCell& cell) {
   return text;
 }
 
+std::string reaches_text(const TaskCell& cell) {
+  std::string text;
+  for (const Reaches& one : cell.reaches) {
+    text += "  " + pad_right(printable(cell.participants[one.participant]), 12) + "in time " +
+            std::to_string(one.in_time) + " of " + std::to_string(one.trials);
+    if (one.deviation) text += ", deviation " + short_number(1e3 * *one.deviation) + " mm";
+    if (one.catch_deviation)
+      text += ", in catch trials " + short_number(1e3 * *one.catch_deviation) + " mm";
+    if (one.adaptation) text += ", adaptation " + short_number(*one.adaptation);
+    if (one.learning.undefined.empty())
+      text += ", from " + short_number(1e3 * one.learning.start) + " to " +
+              short_number(1e3 * one.learning.end) + " mm in " + short_number(one.learning.trials) +
+              " trials";
+    text += "\n";
+  }
+  return text;
+}
+
 std::string cell_text(const TaskCell& cell) {
   std::string text = cell.task;
   for (const std::string* name : {&cell.block_name, &cell.shape, &cell.renderer}) {
@@ -199,6 +217,7 @@ std::string cell_text(const TaskCell& cell) {
   if (cell.magnitude) text += magnitude_text(cell);
   if (cell.ratings) text += ratings_text(cell);
   text += adjustment_text(cell);
+  text += reaches_text(cell);
   if (cell.information && cell.information->plain) {
     text += "  information transfer " + short_number(*cell.information->plain) + " bit of " +
             short_number(cell.information->stimulus_entropy) +

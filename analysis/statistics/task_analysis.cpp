@@ -514,6 +514,64 @@ void add_adjustments(TaskCell& cell, const Trials& trials) {
   cell.adjustments = adjustments(settings);
 }
 
+std::optional<double> mean_of(const std::vector<double>& values) {
+  return values.empty() ? std::nullopt : std::optional(mean(values));
+}
+
+std::optional<double> mean_of(const std::vector<ReachPoint>& points) {
+  std::vector<double> values;
+  for (const ReachPoint& one : points) values.push_back(one.value);
+  return mean_of(values);
+}
+
+Reaches reaches_of(std::size_t participant, Trials trials) {
+  std::ranges::stable_sort(trials, {}, [](const StudyTrial* one) {
+    return std::tuple(one->session, one->block, one->trial);
+  });
+  Reaches out;
+  out.participant = participant;
+  std::vector<double> durations, ratios, errors;
+  double before = 0;
+  for (const StudyTrial* trial : trials) {
+    const double place = before++;
+    if (!trial->answered || !trial->reach) continue;
+    ++out.trials;
+    out.in_time += trial->success ? 1 : 0;
+    const data::ReachRecord& reach = *trial->reach;
+    if (reach.kind == "clamp" && reach.adaptation)
+      out.adaptations.push_back({place, *reach.adaptation});
+    if (reach.kind == "catch" && reach.deviation) out.catches.push_back({place, *reach.deviation});
+    if (reach.kind != "field") continue;
+    if (reach.deviation) out.deviations.push_back({place, *reach.deviation});
+    if (reach.duration) durations.push_back(*reach.duration);
+    if (reach.path_ratio) ratios.push_back(*reach.path_ratio);
+    if (reach.endpoint_error) errors.push_back(*reach.endpoint_error);
+  }
+  std::vector<const StudyTrial*> drawn;
+  for (const StudyTrial* trial : trials) {
+    if (trial->answered && trial->reach && trial->reach->kind == "field" && trial->path.size() > 1)
+      drawn.push_back(trial);
+  }
+  for (std::size_t i = 0; i < drawn.size(); ++i) {
+    if (i < kDrawnPaths) out.first_paths.push_back(drawn[i]->path);
+    if (i >= kDrawnPaths && i + kDrawnPaths >= drawn.size())
+      out.last_paths.push_back(drawn[i]->path);
+  }
+  out.deviation = mean_of(out.deviations);
+  out.catch_deviation = mean_of(out.catches);
+  out.adaptation = mean_of(out.adaptations);
+  out.duration = mean_of(durations);
+  out.path_ratio = mean_of(ratios);
+  out.endpoint_error = mean_of(errors);
+  out.learning = fit_learning(out.deviations);
+  return out;
+}
+
+void add_reaches(TaskCell& cell, const Trials& trials) {
+  for (const auto& [participant, own] : by_participant(trials))
+    cell.reaches.push_back(reaches_of(cell.reaches.size(), own));
+}
+
 InformationTransfer transfer_of(const Trials& trials) {
   std::map<std::string, std::size_t> stimuli, answers;
   for (const StudyTrial* trial : trials) {
@@ -590,6 +648,7 @@ TaskCell cell_of(const CellKey& key, const Trials& trials, const Context& contex
   if (cell.task == "compare" || cell.task == "detect") add_functions(cell, trials, context);
   if (cell.task == "rate" && !add_ratings(cell, trials, context.table)) add_magnitude(cell, trials);
   if (cell.task == "adjust") add_adjustments(cell, trials);
+  if (cell.task == "reach") add_reaches(cell, trials);
   if (cell.task == "identify") add_information(cell, trials);
   add_confidence(cell, trials);
   return cell;

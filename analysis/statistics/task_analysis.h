@@ -14,6 +14,7 @@
 #include "analysis/statistics/paired.h"
 #include "analysis/statistics/psychometric_fit.h"
 #include "analysis/statistics/ratings.h"
+#include "analysis/statistics/reaching.h"
 #include "analysis/statistics/study_design.h"
 #include "analysis/statistics/task_comparisons.h"
 #include "analysis/statistics/task_group.h"
@@ -201,6 +202,7 @@ struct TaskCell {
   std::optional<MagnitudeEstimation> magnitude;    ///< rate: free numbers for levels
   std::optional<Ratings> ratings;                  ///< rate: labelled steps, or without levels
   std::vector<Adjustment> adjustments;             ///< adjust
+  std::vector<Reaches> reaches;                    ///< reach
   std::optional<InformationTransfer> information;  ///< identify: over all its stimuli, pooled
   std::vector<InformationTransfer> informations;   ///< of each participant
   double information_most = 0;  ///< log2 of the number of stimuli or of answers, the lesser, bit

@@ -129,6 +129,7 @@ struct Figures {
 struct Measure {
   const char* name;
   std::function<Figures(const TaskCell&)> of;
+  const char* unit = nullptr;  ///< null: that of the levels
 };
 
 /// Figures of functions that have them.
@@ -216,13 +217,49 @@ Figures ratings(const TaskCell& cell) {
   return figures;
 }
 
+/// A figure of each participant's movements. They may lie on both sides of 0.
+Figures of_reaches(const TaskCell& cell,
+                   const std::function<std::optional<double>(const Reaches&)>& value) {
+  Figures figures;
+  figures.ratios = false;
+  for (const Reaches& one : cell.reaches) {
+    if (const auto found = value(one)) figures.add(cell.participants[one.participant], *found);
+  }
+  return figures;
+}
+
+Figures deviations(const TaskCell& cell) {
+  return of_reaches(cell, [](const Reaches& one) { return one.deviation; });
+}
+
+Figures adaptations(const TaskCell& cell) {
+  return of_reaches(cell, [](const Reaches& one) { return one.adaptation; });
+}
+
+/// A participant without a course over the trials has none: it is left out and counted.
+Figures learning_trials(const TaskCell& cell) {
+  Figures figures = of_reaches(cell, [](const Reaches& one) {
+    return one.learning.undefined.empty() ? std::optional(one.learning.trials) : std::nullopt;
+  });
+  figures.ratios = true;
+  if (!figures.of.empty()) figures.n_undetermined = cell.reaches.size() - figures.of.size();
+  return figures;
+}
+
 constexpr const char* kRating = "rating";
 
 /// The compared measures. Weber fractions are left out: they are JNDs over the same standard.
 std::vector<Measure> measures() {
-  return {{"threshold", thresholds}, {"pse", pses},     {"jnd", jnds},
-          {"exponent", exponents},   {"pse", settings}, {"jnd", setting_jnds},
-          {kRating, ratings}};
+  return {{"threshold", thresholds},
+          {"pse", pses},
+          {"jnd", jnds},
+          {"exponent", exponents},
+          {"pse", settings},
+          {"jnd", setting_jnds},
+          {kRating, ratings},
+          {"deviation", deviations, "m"},
+          {"adaptation", adaptations, ""},
+          {"learning_trials", learning_trials, "trials"}};
 }
 
 void add_mean(GroupMean& group, bool geometric) {
@@ -254,7 +291,10 @@ std::optional<TaskGroup> group_of(const std::vector<const TaskCell*>& cells,
       group.participants.push_back({participant, value});
       result.geometric &= value > 0;
     }
-    if (name != "exponent" && name != "weber_fraction") result.unit = cell->level_unit;
+    if (measure.unit != nullptr)
+      result.unit = measure.unit;
+    else if (name != "exponent" && name != "weber_fraction")
+      result.unit = cell->level_unit;
   }
   if (result.renderers.empty()) return std::nullopt;
   result.task = cells.front()->task;
@@ -414,6 +454,9 @@ std::string measure_plural(const std::string& measure) {
   if (measure == "rating") return "Mean ratings";
   if (measure == "d_prime") return "d'";
   if (measure == "criterion") return "Criteria";
+  if (measure == "deviation") return "Deviations";
+  if (measure == "adaptation") return "Adaptations";
+  if (measure == "learning_trials") return "Learning times";
   return measure == "pse" ? "PSEs" : "Exponents";
 }
 

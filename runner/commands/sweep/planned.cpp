@@ -211,6 +211,10 @@ std::vector<double> figures_of_participants(const analysis::TaskCell& cell,
     if (measure == "pse") add(one.pse);
     if (measure == "jnd") add(one.jnd);
   }
+  for (const analysis::Reaches& one : cell.reaches) {
+    if (measure == "deviation") add(one.deviation);
+    if (measure == "adaptation") add(one.adaptation);
+  }
   for (const analysis::InformationTransfer& one : cell.informations) {
     if (measure == "bits") add(one.corrected);
   }
