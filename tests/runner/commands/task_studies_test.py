@@ -14,7 +14,7 @@ import unittest
 from command_case import CommandCase
 
 PROTOCOLS = pathlib.Path(sys.argv.pop(1))
-SHIPPED = ("stiffness-2afc", "size-questplus", "roughness-magnitude", "grating-roughness", "spacing-2afc", "tap-hardness")
+SHIPPED = ("stiffness-2afc", "size-questplus", "roughness-magnitude", "grating-roughness", "spacing-2afc", "tap-hardness", "force-field")
 SHAPES = [{"name": "sphere", "shape": "sphere", "radius_m": 0.03}, {"name": "cube", "shape": "cube", "edge_m": 0.05}]
 KEYS = {"1": "sphere", "2": "cube"}
 
