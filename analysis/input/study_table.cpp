@@ -218,7 +218,7 @@ std::optional<data::ReachRecord> read_reach(TaskRow& row) {
   if (row.value("task") != "reach") return std::nullopt;
   data::ReachRecord reach;
   reach.kind = row.value("reach_kind");
-  reach.duration = row.number("duration");
+  reach.duration = row.number("movement_duration");
   reach.peak_speed = row.number("peak_speed");
   reach.deviation = row.number("deviation");
   reach.largest_deviation = row.number("largest_deviation");

@@ -80,6 +80,7 @@ constexpr std::array kColumnNames = std::to_array<std::string_view>({"adaptation
                                                                      "longest_period",
                                                                      "max_force",
                                                                      "missed_ticks",
+                                                                     "movement_duration",
                                                                      "name",
                                                                      "normal_x",
                                                                      "normal_y",

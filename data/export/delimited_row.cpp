@@ -206,7 +206,7 @@ std::vector<Column> with_reaches(std::vector<Column> columns) {
        {{"field", "the fields of the stimulus"},
         {"catch", "nothing, unannounced"},
         {"clamp", "a channel from the start to the target"}}},
-      {"duration",
+      {"movement_duration",
        "reach: from the first tick at 20 mm/s or faster before the peak speed to the first tick at "
        "rest in the target",
        "s"},

@@ -83,6 +83,18 @@ class Dictionary(unittest.TestCase):
             self.assertEqual((documented.pop(varied), units[varied]), ("", "N/m"))
         self.assertEqual(documented, {column: units[column] for column in documented})
 
+    def test_columns_of_reaching_with_their_units(self):
+        output_of("simulate", ROOT / "protocols/force-field.json", "--db", "reach.db", "--participants", 1,
+                  folder=self.folder)
+        output_of("export", "--db", "reach.db", "--format", "csv", "--out", "reach.csv", "--codebook", "reach-codebook.csv",
+                  folder=self.folder)
+        with open(self.folder / "reach-codebook.csv", newline="") as file:
+            units = {row["column"]: row["unit"] for row in csv.DictReader(file) if row["table"] == "trials"}
+        documented = self.documented("trials of reaching")
+        others = set(self.documented("trials")) | set(self.documented("trials of tasks"))
+        self.assertEqual(set(documented), set(units) - others)
+        self.assertEqual(documented, {column: units[column] for column in documented})
+
     def test_columns_of_pages(self):
         output_of("simulate", ROOT / "protocols/roughness-magnitude.json", "--db", "pages.db", "--participants", 1,
                   folder=self.folder)

@@ -196,6 +196,7 @@ TEST(Factors, TracksOfCellsAreTheirOwn) {
 TEST(Factors, ABlockMayTakeSomeLevels) {
   json study = crossed_study("constant");
   study["blocks"][0]["factors"] = {{"size", {"l", "s"}}};
+  study["factors"].erase(0);
   const Protocol protocol = parsed(study);
   std::vector<std::string> names;
   for (const int stimulus : protocol.blocks[0].stimuli)
@@ -218,6 +219,7 @@ TEST(Factors, AnswersAreOfPlainStimuli) {
   json study = crossed_study("none");
   study["blocks"].push_back(json::parse(R"({"name": "which", "task": "identify",
     "stimuli": ["soft", "lump"], "repetitions": 2, "factors": ["surface"]})"));
+  study["factors"].erase(1);
   const Protocol protocol = parsed(study);
   const TaskBlock& block = protocol.blocks.back();
   ASSERT_EQ(block.answers.size(), 2U);

@@ -52,7 +52,7 @@ class Reach(command_case.CommandCase):
         for row in rows:
             self.assertIn(row["response"], ("in_time", "fast", "slow"))
             self.assertEqual(row["correct"], "1" if row["response"] == "in_time" else "0")
-            self.assertTrue(0.3 < float(row["duration"]) < 1.5, row["duration"])
+            self.assertTrue(0.3 < float(row["movement_duration"]) < 1.5, row["movement_duration"])
             self.assertTrue(0.15 < float(row["peak_speed"]) < 0.6)
             self.assertGreaterEqual(float(row["path_ratio"]), 1)
             self.assertLess(float(row["endpoint_error"]), 0.005)
