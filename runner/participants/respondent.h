@@ -90,7 +90,7 @@ class Respondent {
     return "";
   }
   /// A trial is on record: of this run, or of an earlier one that the session resumes.
-  virtual void recorded(const data::TrialRecord& /*record*/) {}
+  virtual void learn_from(const data::TrialRecord& /*record*/) {}
   /// Called with every sample of the servo. Returns the answer once there is one; answers before
   /// time zero do not count. \throws TrialCutOff if the trial is to be repeated.
   virtual std::optional<Answer> step(const servo::Sample& sample) = 0;

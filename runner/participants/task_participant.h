@@ -184,7 +184,7 @@ class TaskParticipant final : public Respondent {
   void begin_trial(const protocols::Trial& trial) override;
   void begin_interval(const protocols::Trial& trial, const IntervalView& view) override;
   std::optional<Answer> step(const servo::Sample& sample) override;
-  void recorded(const data::TrialRecord& record) override { reacher_.learn(record); }
+  void learn_from(const data::TrialRecord& record) override { reacher_.learn(record); }
   std::optional<Answer> confidence(const protocols::ConfidenceSpec& asked) override;
   std::optional<std::string> ask(const protocols::PageSpec& page, const protocols::PageItem& item,
                                  const Asking& how) override;

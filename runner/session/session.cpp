@@ -522,7 +522,7 @@ void Session::step() {
     case State::response:
       station_.log.finish(record_);
       if (events_ != nullptr) events_->recorded(record_);
-      participant_.recorded(record_);
+      participant_.learn_from(record_);
       report_level();
       give_feedback();
       state_ = before_trial();

@@ -373,7 +373,7 @@ void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& 
   }
   const Station station{protocol, study.library, session.plan, servo,
                         clock,    session.utc,   log,          session.advisor};
-  for (const data::TrialRecord& record : session.completed) participant->recorded(record);
+  for (const data::TrialRecord& record : session.completed) participant->learn_from(record);
   Session trials(station, *participant);
   // A shown trial is recorded, even if the run stops after it.
   while (trials.state() != Session::State::end &&
