@@ -428,6 +428,7 @@ Panel named_ratings_panel(const CellList& cells) {
   const std::vector<std::string> shapes = distinct(cells, &TaskCell::shape);
   const std::vector<std::string> renderers = distinct(cells, &TaskCell::renderer);
   std::vector<std::string> labels;
+  labels.reserve(shapes.size());
   for (const std::string& shape : shapes) labels.push_back(place_label(shape, shapes));
   Panel panel;
   panel.title = "Mean ratings";

@@ -27,6 +27,7 @@ std::optional<double> share_correct(const ParticipantCell& cell) {
 
 std::vector<WithinFactor> sizes_of(const std::vector<StudyFactor>& within) {
   std::vector<WithinFactor> out;
+  out.reserve(within.size());
   for (const StudyFactor& factor : within) out.push_back({factor.name, factor.levels.size()});
   return out;
 }
@@ -41,6 +42,7 @@ std::optional<std::size_t> known_group(const GroupLabels& labels, const std::str
 /// Adjusts the p of the effects that the study is about. \param tests  empty: all
 void adjust_effects(const std::vector<std::string>& tests, std::vector<GroupEffect>& effects) {
   std::vector<std::optional<double>> p;
+  p.reserve(effects.size());
   for (const GroupEffect& effect : effects)
     p.push_back(is_tested(tests, effect.name) ? effect.p_value() : std::nullopt);
   const auto adjusted = holm(p);

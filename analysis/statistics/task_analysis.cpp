@@ -520,6 +520,7 @@ std::optional<double> mean_of(const std::vector<double>& values) {
 
 std::optional<double> mean_of(const std::vector<ReachPoint>& points) {
   std::vector<double> values;
+  values.reserve(points.size());
   for (const ReachPoint& one : points) values.push_back(one.value);
   return mean_of(values);
 }

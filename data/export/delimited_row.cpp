@@ -374,6 +374,7 @@ std::vector<Column> with_factors(std::vector<Column> columns,
   const auto place = std::ranges::find_if(
       columns, [](const Column& one) { return std::string_view(one.name) == "practice"; });
   std::vector<Column> more;
+  more.reserve(factors.size());
   for (const StoredFactor& factor : factors) more.push_back(column_of(factor));
   columns.insert(place + 1, more.begin(), more.end());
   return columns;

@@ -85,9 +85,9 @@ class ExploreView {
   void keep_picture();
   void keep_clip();
 
-  /// Draws the rest of a clip and saves it. Calls `continues` before each picture with the share done
-  /// (0 to 1); false ends the clip there. \return result of keep_picture; empty: no clip was in
-  /// progress
+  /// Draws the rest of a clip and saves it. Calls `continues` before each picture with the share
+  /// done (0 to 1); false ends the clip there. \return result of keep_picture; empty: no clip was
+  /// in progress
   std::string finish_clip(const std::function<bool(double)>& continues);
 
  private:
