@@ -70,13 +70,17 @@ class Dictionary(unittest.TestCase):
             header = file.readline().strip().split(",")
         self.assertEqual(set(header), set(self.documented("trials")) - {"elapsed"})
 
+    def units_of(self, protocol):
+        """{column: its unit} of a study's trials, as its codebook has them."""
+        name = protocol.split(".")[0]
+        output_of("simulate", ROOT / "protocols" / protocol, "--db", f"{name}.db", "--participants", 1, folder=self.folder)
+        output_of("export", "--db", f"{name}.db", "--format", "csv", "--out", f"{name}.csv", "--codebook",
+                  f"{name}-codebook.csv", folder=self.folder)
+        with open(self.folder / f"{name}-codebook.csv", newline="") as file:
+            return {row["column"]: row["unit"] for row in csv.DictReader(file) if row["table"] == "trials"}
+
     def test_columns_of_tasks_with_their_units(self):
-        output_of("simulate", ROOT / "protocols/stiffness-2afc.json", "--db", "tasks.db", "--participants", 1,
-                  folder=self.folder)
-        output_of("export", "--db", "tasks.db", "--format", "csv", "--out", "tasks.csv", "--codebook", "tasks-codebook.csv",
-                  folder=self.folder)
-        with open(self.folder / "tasks-codebook.csv", newline="") as file:
-            units = {row["column"]: row["unit"] for row in csv.DictReader(file) if row["table"] == "trials"}
+        units = self.units_of("stiffness-2afc.json")
         documented = self.documented("trials of tasks")
         self.assertEqual(set(documented), set(units) - set(self.documented("trials")))
         for varied in ("level", "standard_level"):  # the unit of what this protocol varies
@@ -84,12 +88,7 @@ class Dictionary(unittest.TestCase):
         self.assertEqual(documented, {column: units[column] for column in documented})
 
     def test_columns_of_reaching_with_their_units(self):
-        output_of("simulate", ROOT / "protocols/force-field.json", "--db", "reach.db", "--participants", 1,
-                  folder=self.folder)
-        output_of("export", "--db", "reach.db", "--format", "csv", "--out", "reach.csv", "--codebook", "reach-codebook.csv",
-                  folder=self.folder)
-        with open(self.folder / "reach-codebook.csv", newline="") as file:
-            units = {row["column"]: row["unit"] for row in csv.DictReader(file) if row["table"] == "trials"}
+        units = self.units_of("force-field.json")
         documented = self.documented("trials of reaching")
         others = set(self.documented("trials")) | set(self.documented("trials of tasks"))
         self.assertEqual(set(documented), set(units) - others)
