@@ -235,7 +235,7 @@ void expect_reason(const std::string& object, const char* place) {
   EXPECT_NE(found[0].find(place), std::string::npos) << found[0];
 }
 
-TEST(EffectCheck, NamesThePlaceOfWhatADeviceCannotShow) {
+TEST(EffectCheck, NamesThePlaceThatADeviceCannotShow) {
   const std::string plate = R"("shape": "box", "size_m": [0.05, 0.05, 0.02], )";
   EXPECT_TRUE(
       reasons(plate + R"("texture": {"kind": "sine", "period_m": 0.002, "depth_m": 0.0001})")

@@ -80,7 +80,7 @@ TEST(Texts, AreAllReplacedButStoredAnswersStay) {
   EXPECT_EQ(protocol.blocks[0].answers[1].label, "T blocks.constant.keys.2");
 }
 
-TEST(Texts, OfACellAreItsOwnWhereItsLevelSetsThem) {
+TEST(Texts, CellsHaveTheTextsThatTheirLevelsSet) {
   const std::string path = PALPATE_SOURCE_DIR "/tests/protocols/good/everything-v2.json";
   std::ifstream in(path);
   json document = json::parse(in);

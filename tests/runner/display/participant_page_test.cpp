@@ -71,7 +71,7 @@ TEST(ParticipantPage, TheSamePageGivesTheSamePixels) {
   EXPECT_GT(inked_rows(a), 30);
 }
 
-TEST(ParticipantPage, AMovementShowsHomeTipAndItsTargetAtGo) {
+TEST(ParticipantPage, MovementShowsHomeTipAndTargetAtGo) {
   Page page;
   page.kind = Page::Kind::neutral;
   page.reach = ReachPicture{.home = {0, -0.04, 0},

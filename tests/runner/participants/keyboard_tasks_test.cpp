@@ -109,7 +109,7 @@ class KeyboardTasks : public ::testing::Test {
   Asking how_;
 };
 
-TEST_F(KeyboardTasks, AMovementShowsItsTargetAndTakesNoKey) {
+TEST_F(KeyboardTasks, MovementShowsItsTargetAndTakesNoKey) {
   protocol_ = protocols::parse_protocol(PALPATE_SOURCE_DIR "/tests/protocols/good/reach-v2.json");
   person();
   trial_.level = 2;
