@@ -397,8 +397,9 @@ void draw_forces_off(const ConsoleState& state, double silence,
   ImGui::EndDisabled();
 }
 
-float health_height() {
-  return 6 * (ImGui::GetTextLineHeight() + 2 * ImGui::GetStyle().CellPadding.y);
+float health_height(const ConsoleState& state) {
+  return (state.field_power ? 7.0F : 6.0F) *
+         (ImGui::GetTextLineHeight() + 2 * ImGui::GetStyle().CellPadding.y);
 }
 
 void draw_health(const ConsoleState& state, bool compact) {
@@ -425,6 +426,7 @@ void draw_health(const ConsoleState& state, bool compact) {
   table_row("Contact", sample.rendering.contacts == 0
                            ? "none"
                            : fixed_point(sample.rendering.deepest.depth * 1e3, 2) + " mm deep");
+  if (state.field_power) table_row("Fields", power_words(*state.field_power));
   ImGui::EndTable();
 }
 

@@ -49,7 +49,7 @@ void draw_forces_off(const ConsoleState& state, double silence,
                      std::vector<ConsoleCommand>& commands);
 /// \param compact  as for the status
 void draw_health(const ConsoleState& state, bool compact);
-float health_height();  ///< px, of that which is not compact
+float health_height(const ConsoleState& state);  ///< px, of that which is not compact
 /// \param height  px
 void draw_forces(const std::deque<ForcePoint>& forces, float width, float height);
 void draw_times(const std::vector<double>& times, float width, float height);

@@ -81,7 +81,8 @@ void ConsoleView::draw_picture(const Modifiers& modifiers, bool with_plots,
   const ImVec2 room = ImGui::GetContentRegionAvail();
   const float plots = with_plots ? std::clamp(0.22F * room.y, 6 * font, 12 * font) : 0;
   const float width = std::max(room.x, 40.0F);
-  const float readings = readings_are_in_picture(with_plots) ? health_height() + spacing.y : 0;
+  const float readings =
+      readings_are_in_picture(with_plots) ? health_height(state_) + spacing.y : 0;
   const float height = std::max(room.y - readings - (with_plots ? plots + spacing.y : 0), 40.0F);
   if (!state_.checklist.steps.empty()) {
     ImGui::BeginChild("checklist", {width, height});

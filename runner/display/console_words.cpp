@@ -126,6 +126,14 @@ std::string axis_label(double value) {
   return text;
 }
 
+std::string power_words(double watts) {
+  if (!std::isfinite(watts)) return "-";
+  char text[64];
+  std::snprintf(text, sizeof text, "%.1f mW %s the hand", 1e3 * std::abs(watts),
+                watts < 0 ? "out of" : "into");
+  return text;
+}
+
 std::string duration_text(double seconds) {
   if (!std::isfinite(seconds) || seconds < 0) return "-";
   const auto two = [](long n) { return (n < 10 ? "0" : "") + std::to_string(n); };

@@ -28,6 +28,8 @@ bool forces_not_yet_on(const ConsoleState& state);
 std::string forces_text(const ConsoleState& state);
 /// A number at an axis, in full: "2.5", "500". Half of the number at the axis' end is shown too.
 std::string axis_label(double value);
+/// "8.2 mW into the hand", "3.0 mW out of the hand"
+std::string power_words(double watts);
 /// "1 h 05 min", "3 min 20 s"
 std::string duration_text(double seconds);
 

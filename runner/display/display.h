@@ -177,6 +177,8 @@ struct ConsoleState {
   rendering::Tool tool;                       ///< carried by the stylus; empty: none
   std::uint64_t ticks = 0, missed_ticks = 0;  ///< of this session
   std::int64_t longest_period_ns = 0;
+  /// W, that fields which depend on velocity put into the hand; none: there are no such fields.
+  std::optional<double> field_power;
   // Version 2 of protocols:
   std::string task;                 ///< "compare", ...; empty: version 1
   int interval = 0, intervals = 0;  ///< number within the trial, and their count

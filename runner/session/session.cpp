@@ -126,7 +126,10 @@ void Session::prepare_interval(const protocols::Trial& trial, const protocols::I
   record.renderer = protocols::to_string(interval.renderer);
   record.level = interval.level;
   record.standard = interval.standard;
-  station_.servo.prepare(scenes_.scene(trial, interval), renderer_for(interval.renderer), home);
+  rendering::Scene scene = scenes_.scene(trial, interval);
+  const rendering::Renderer& renderer = renderer_for(interval.renderer);
+  power_.begin(scene, renderer.side_contact());
+  station_.servo.prepare(std::move(scene), renderer, home);
 }
 
 servo::HomeZone Session::home_of(const protocols::Interval& interval, double rest) const {
@@ -155,6 +158,7 @@ std::optional<participants::Answer> Session::wait_in_interval(
     if (feeling && view.felt) {
       record_onset_and_contact(sample);
       contact_.add(sample);
+      power_.add(sample);
       if (station_.protocol.samples) record_sample(sample);
     }
     if (feeling) record_.response_ns = sample.time_ns;

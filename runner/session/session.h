@@ -10,6 +10,7 @@
 #include "data/record.h"
 #include "protocols/session_plan.h"
 #include "runner/participants/respondent.h"
+#include "runner/session/field_power.h"
 #include "runner/session/live_forces.h"
 #include "runner/session/reach_measures.h"
 #include "runner/session/session_end.h"
@@ -39,6 +40,8 @@ class Session {
           SessionEvents* events = nullptr, double least_reach = 0);
 
   State state() const { return state_; }
+  /// Of the interval under way.
+  const FieldPower& field_power() const { return power_; }
   const protocols::SessionPlan& plan() const { return station_.plan; }
   /// What a trial asks.
   const protocols::TaskBlock& task_of(const protocols::Trial& trial) const;
@@ -106,6 +109,7 @@ class Session {
   State state_ = State::instruction;
   data::TrialRecord record_;     ///< of the trial under way
   ContactLog contact_;           ///< likewise
+  FieldPower power_;             ///< likewise
   servo::ServoQuality quality_;  ///< likewise, of its intervals so far
   SessionScenes scenes_;
   int asked_trial_ = 0;  ///< the last trial for which an advisor was asked

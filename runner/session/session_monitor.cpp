@@ -110,6 +110,9 @@ void SessionMonitor::show() {
   state_.blocks = plan.last_block();
   state_.remaining = seconds_per_trial_ * static_cast<double>(expected - plan.done());
   state_.sample = sources_.forces.newest();
+  state_.field_power.reset();
+  if (feeling_ && session.field_power().measures())
+    state_.field_power = session.field_power().watts();
   state_.bodies.clear();
   if (feeling_) {
     const auto bodies = station_.servo.bodies();
