@@ -172,6 +172,16 @@ def group(palpate, folder):
     shutil.copyfile(folder / "tasks" / "group1.svg", IMAGES / "group.svg")
 
 
+def study_figure(protocol, name):
+    """A figure of three simulated participants, as protocols/README.md has them simulated and analysed."""
+    def make(palpate, folder):
+        database, figures = folder / f"{protocol}.db", folder / protocol
+        subprocess.run([palpate, "simulate", PROTOCOLS / f"{protocol}.json", "--db", database, "--participants", "3", "--seed", "1"], check=True)
+        subprocess.run([palpate, "analyze", "--db", database, "--figures", figures], stdout=subprocess.DEVNULL, check=True)
+        shutil.copyfile(figures / f"{name}.svg", IMAGES / f"{protocol}.svg")
+    return make
+
+
 def sweep_gains(palpate, folder):
     """The sweep of runner/participants/README.md, which takes half an hour."""
     database = folder / "participants.sweep"
@@ -228,7 +238,8 @@ def explore_window(palpate, folder):
 
 
 SCENES = ["fig3b-extended-probe", "fig13-two-objects", "fig14-dumbbells", "fig16-rocket", "fig17a-engine", "fig17b-instrument", "layers"]
-PICTURES = {**{name: scene(name) for name in SCENES},
+STUDIES = {"force-field": "reach2", "grating-roughness": "magnitude1", "spacing-2afc": "function1", "tap-hardness": "function1"}
+PICTURES = {**{name: scene(name) for name in SCENES}, **{name: study_figure(name, figure) for name, figure in STUDIES.items()},
             "contact-patches": lambda palpate, folder: (IMAGES / "contact-patches.svg").write_text(contact_patches()),
             "explore-window": explore_window, "live-session": lambda *arguments: undisturbed(live_session, *arguments), "figure15": figure("figure15"),
             "speedup": figure("speedup"), "power": power, "group": group, "sweep-gains": sweep_gains, "soft-stability": soft_stability,
