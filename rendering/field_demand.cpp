@@ -9,7 +9,7 @@
 namespace palpate::rendering {
 namespace {
 
-using Kind = stimuli::FieldSpec::Kind;
+using DemandedKind = stimuli::FieldSpec::Kind;
 
 /// N s/m, the largest sum of a row: at least the largest eigenvalue.
 double size_of(const Mat3& b) {
@@ -39,11 +39,12 @@ FieldDemand demand_of(const std::vector<stimuli::FieldSpec>& fields, double rate
   FieldDemand out;
   for (const stimuli::FieldSpec& field : fields) {
     const double alpha = low_pass_share(1 / rate, field.low_pass);
-    if (field.kind == Kind::spring || field.kind == Kind::channel) out.stiffness += field.stiffness;
-    if (field.kind != Kind::viscous && field.kind != Kind::curl) continue;
-    const double size =
-        field.kind == Kind::viscous ? size_of(field.damping) : std::abs(field.damping[0][0]);
-    if (field.kind == Kind::viscous)
+    if (field.kind == DemandedKind::spring || field.kind == DemandedKind::channel)
+      out.stiffness += field.stiffness;
+    if (field.kind != DemandedKind::viscous && field.kind != DemandedKind::curl) continue;
+    const double size = field.kind == DemandedKind::viscous ? size_of(field.damping)
+                                                            : std::abs(field.damping[0][0]);
+    if (field.kind == DemandedKind::viscous)
       out.damping += size * alpha / (2 - alpha);
     else if (!field.destabilising)
       out.damping += curl_demand(size, field.low_pass, 1 / rate);

@@ -51,7 +51,7 @@ constexpr double kUsedUp = 0.25;        // of the room is left, and a way is lon
 constexpr double kSameTurn = 0.125;     // of the tolerance; a turn that moves ends by less
 constexpr double kListed = 16;          // tolerances; error of a listed plane
 constexpr double kAlmostAlong = 1e-2;   // rad; closer to its edge its error is larger
-constexpr double kLevel = 1e-12;        // of the length; a triangle along the segment
+constexpr double kLevelAlong = 1e-12;   // of the length; a triangle along the segment
 constexpr std::size_t kOfTriangle = 5;  // patches of a triangle at most
 
 /// m, between places of rest on the two sides of a flat valley. \param depth  of the tool
@@ -92,7 +92,7 @@ double most_turned(const PosedTool& from, const PosedTool& to) {
 /// rounding. \param what  bits of surface_pair
 void SurfaceTool::list_triangle(std::uint32_t index, std::uint8_t what, std::uint8_t segment) {
   const Vec3& along = own_.listed.segments[segment].along;
-  const double length2 = glm::dot(along, along), level = kLevel * std::sqrt(length2);
+  const double length2 = glm::dot(along, along), level = kLevelAlong * std::sqrt(length2);
   const SurfaceTriangle& t = surface_.triangles()[index];
   const double own = glm::dot(t.normal, along);
   const auto add_face = [&](bool tail) {

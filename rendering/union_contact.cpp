@@ -239,15 +239,15 @@ void IdealTool::remember(std::size_t first_contact) {
   remember_ideal_tool(tick_, index_, pose_, at_, !planes_.empty() || stuck_, first_contact);
 }
 
-constexpr int kRounds = 96;          // of casts in one tick; then the ideal tool stays where it is
-constexpr double kSlidOff = 4;       // skins; a contact farther off its facet has left it
-constexpr double kOnFacet = 1e-11;   // of the size, added to that for thin skins
-constexpr double kAtRest = 2e-12;    // of the size: the same without the skin
-constexpr double kExact = 1e-5;      // of the skin; smaller distances are rounding
-constexpr double kRounding = 0.125;  // of the skin; tolerance in keeping it
-constexpr double kLessSkin = 0.25;   // factor on the skin where two do not fit, repeated
-constexpr double kInTheWay = 0.25;   // of a part's tolerance; a deeper tool at rest is held
-constexpr double kSamePlace = 8;     // skins; within it a contact that comes back never left
+constexpr int kRounds = 96;         // of casts in one tick; then the ideal tool stays where it is
+constexpr double kSlidOff = 4;      // skins; a contact farther off its facet has left it
+constexpr double kOnFacet = 1e-11;  // of the size, added to that for thin skins
+constexpr double kSkinAtRest = 2e-12;  // of the size: the same without the skin
+constexpr double kExact = 1e-5;        // of the skin; smaller distances are rounding
+constexpr double kRounding = 0.125;    // of the skin; tolerance in keeping it
+constexpr double kLessSkin = 0.25;     // factor on the skin where two do not fit, repeated
+constexpr double kInTheWay = 0.25;     // of a part's tolerance; a deeper tool at rest is held
+constexpr double kSamePlace = 8;       // skins; within it a contact that comes back never left
 
 /// Resumes the planes that held the tool at the last tick if it is still beyond them.
 void IdealTool::resume_planes() {
@@ -346,7 +346,7 @@ bool IdealTool::let_go_of_slid_planes(bool at_rest) {
   planes_.remove_if([&](Plane& plane) {
     NearPair& near = pairs_[plane.near];
     if (plane.stays && parted_here(near)) return false;
-    if (!(at_rest ? slid_off_at_rest(plane, kAtRest) : slid_off(plane))) return false;
+    if (!(at_rest ? slid_off_at_rest(plane, kSkinAtRest) : slid_off(plane))) return false;
     near.parted = true;
     near.parted_at = at_;
     slid = true;

@@ -202,9 +202,9 @@ constexpr double kTouching = 1e-13;
 
 // Of the thinnest part. The turn is cut into steps in which no point of the tool moves farther than
 // this. Pushing the turned tool out may not move it farther either, or it could come out elsewhere.
-constexpr double kStep = 0.25;
-constexpr int kMostSteps = 1000;  // of a turn
-constexpr int kHalvings = 8;      // of the step in which the turn gets stuck
+constexpr double kTurnStep = 0.25;
+constexpr int kMostTurnSteps = 1000;  // of a turn
+constexpr int kHalvings = 8;          // of the step in which the turn gets stuck
 
 constexpr int kMostRounds = 5000;  // of a descent
 
@@ -378,12 +378,12 @@ double UnionOracle::depth(const OraclePose& tool) const {
 bool UnionOracle::turn(OraclePose& ideal, const Mat3& to) const {
   const double angle = angle_between(ideal.axes, to);
   const double steps =
-      std::clamp(std::ceil(angle * reach_ / (kStep * thickness_)), 1.0, double{kMostSteps});
+      std::clamp(std::ceil(angle * reach_ / (kTurnStep * thickness_)), 1.0, double{kMostTurnSteps});
   const Mat3 start = ideal.axes;
   const auto try_to = [&](double fraction) {
     OraclePose turned{ideal.tip, fraction < 1 ? turned_between(start, to, fraction) : to};
     if (!push_out(sums(turned.axes), turned.tip, touch_) ||
-        glm::length(turned.tip - ideal.tip) > kStep * thickness_) {
+        glm::length(turned.tip - ideal.tip) > kTurnStep * thickness_) {
       return false;
     }
     ideal = turned;
