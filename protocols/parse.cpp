@@ -16,6 +16,7 @@
 #include "protocols/groups.h"
 #include "protocols/json_document.h"
 #include "protocols/parse_scene.h"
+#include "protocols/parse_sight.h"
 #include "protocols/protocol.h"
 #include "protocols/schedule.h"
 #include "protocols/tasks/parse_blocks.h"
@@ -381,6 +382,7 @@ Protocol read_design(const json& root, const MeshFiles& files, FaultList& faults
   read_stimuli(reader, protocol, files);
   if (protocol.version == 2) {
     read_tasks(reader, protocol, files);
+    read_view(reader, protocol);
     patches = read_groups(reader, protocol);
     read_tested_effects(reader, protocol);
   } else {
@@ -398,6 +400,7 @@ Protocol read_design(const json& root, const MeshFiles& files, FaultList& faults
   check_reaching(protocol, faults);
   if (faults.empty()) add_cells(root, files, protocol, faults);
   if (faults.empty()) add_channels(protocol);
+  if (faults.empty()) check_sight(protocol, faults);
   if (faults.empty()) (protocol.version == 2 ? check_blocks : check_schedule)(protocol, faults);
   return protocol;
 }

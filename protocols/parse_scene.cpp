@@ -13,6 +13,7 @@
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "protocols/parse_effects.h"
+#include "protocols/parse_sight.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/shapes.h"
@@ -542,6 +543,7 @@ StimulusSpec read_stimulus(ObjectReader& reader, const stimuli::Material& defaul
     }
   });
   stimulus.object = read_object(reader, material, files);
+  read_seen(reader, files, stimulus);
   reader.refuse_unknown_keys();
   return stimulus;
 }

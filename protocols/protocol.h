@@ -14,6 +14,7 @@
 
 #include "data/base/group_assignment.h"
 #include "protocols/procedures/procedure_spec.h"
+#include "protocols/sight.h"
 #include "stimuli/shapes.h"
 #include "stimuli/vec.h"
 
@@ -150,6 +151,8 @@ struct TaskBlock {
 
   int intervals = 2;  ///< compare: 2 or 3; external: 1 to 10
   bool same_different = false;
+  enum class IntervalsSeen { both, standard, comparison };
+  IntervalsSeen intervals_seen = IntervalsSeen::both;  ///< compare: those of which things are seen
   bool asks_smaller = false;    ///< the question asks for the interval with the smaller level
   double inter_interval = 0.5;  ///< s, forces off and the stylus at rest at home
   std::optional<double> interval_limit;  ///< s, forces on; none: until the participant goes on
@@ -273,6 +276,8 @@ struct StimulusSpec {
   std::string name;            ///< unique within the protocol; in a cell: data/base/cell_name.h
   stimuli::ObjectSpec object;  ///< material already resolved against the protocol's default
   std::size_t place = 0;       ///< in the protocol's list; in a cell: of the plain stimulus
+  std::optional<SeenSpec> seen = std::nullopt;  ///< none: nothing is seen of it
+  bool felt = true;                             ///< false: it is seen and gives no force
 };
 
 struct Protocol {
@@ -364,6 +369,8 @@ struct Protocol {
   std::vector<std::string> stimulus_texts;  ///< JSON of each stimulus, for its levels
   std::vector<Factor> factors;              ///< crossed by blocks; each cell has its own stimuli
   GroupAssignment groups;                   ///< of participants
+  std::optional<ViewSpec> view;             ///< where the picture and the eyes are
+  std::optional<CuesSpec> cues;             ///< blocks of a study of seen and felt cues
   std::vector<std::string> tests;           ///< effects of the confirmatory family; empty: all
   /// The protocol of each group, with what differs for it (groups.h). Empty: there are no groups,
   /// or this is a group's own.

@@ -49,6 +49,13 @@ inline const TaskBlock& block_of(const Protocol& protocol, const Trial& trial) {
   return protocol.blocks[static_cast<std::size_t>(trial.task_block)];
 }
 
+/// Whether things are seen in an interval of a block, if its stimulus has any.
+inline bool is_seen(const TaskBlock& block, const Interval& interval) {
+  using Seen = TaskBlock::IntervalsSeen;
+  return block.intervals_seen == Seen::both ||
+         interval.standard == (block.intervals_seen == Seen::standard);
+}
+
 /// The study of shapes that a protocol of version 1 describes, as its only block: to identify one
 /// of all stimuli, in their order.
 TaskBlock shapes_block(const Protocol& protocol);

@@ -780,6 +780,7 @@ StimulusLibrary::StimulusLibrary(const protocols::Protocol& protocol, SceneBuild
     textures_.push_back(builder.texture_of(stimulus.object));
     moving_.push_back(builder.moving_of({stimulus.object}));
     reaches_.push_back(reach);
+    felt_.push_back(stimulus.felt);
   }
 }
 
@@ -788,6 +789,7 @@ rendering::Scene StimulusLibrary::empty_scene(protocols::RendererKind renderer) 
 }
 
 rendering::Scene StimulusLibrary::scene(const protocols::Trial& trial) const {
+  if (!felt_[static_cast<std::size_t>(trial.stimulus)]) return empty_scene(trial.renderer);
   const bool sides = renderer_for(trial.renderer).side_contact();
   std::vector<rendering::SceneObject> objects =
       (sides ? with_sides_ : without_sides_)[trial.stimulus];

@@ -150,6 +150,7 @@ class StimulusLibrary {
   std::vector<std::vector<rendering::MovingObject>> moving_;  ///< by stimulus: itself or nothing
   std::vector<std::shared_ptr<const stimuli::Texture>> textures_;  ///< by stimulus
   std::vector<double> reaches_;
+  std::vector<bool> felt_;  ///< by stimulus; others are only seen
   std::vector<SharpEdges> edges_;
   Vec3 gravity_;  ///< m/s^2
   rendering::Tool tool_;

@@ -28,6 +28,14 @@ void add_files(const stimuli::ObjectSpec& object, StoredFiles& files) {
   for (const stimuli::ObjectSpec& part : object.parts) add_files(part, files);
 }
 
+void add_files(const StimulusSpec& stimulus, StoredFiles& files) {
+  add_files(stimulus.object, files);
+  if (!stimulus.seen) return;
+  if (stimulus.seen->file_bytes)
+    files.emplace(stimulus.seen->file_name, *stimulus.seen->file_bytes);
+  if (stimulus.seen->shape) add_files(*stimulus.seen->shape, files);
+}
+
 json number_of(double level) {
   constexpr double kExact = 9007199254740992;
   if (std::floor(level) == level && std::abs(level) < kExact)
@@ -36,20 +44,14 @@ json number_of(double level) {
 }
 
 /// The folder does not matter: the contents of a stimulus's files were read with the protocol.
-stimuli::ObjectSpec read_again(const json& value, const Protocol& protocol,
-                               const stimuli::ObjectSpec& before, const std::string& name) {
-  MeshFiles files{before.file.empty() ? "" : folder_of(before.file), {}};
+StimulusSpec read_again(const json& value, const Protocol& protocol, const StimulusSpec& before) {
+  MeshFiles files{before.object.file.empty() ? "" : folder_of(before.object.file), {}};
   add_files(before, files.stored);
-  FaultList faults("stimulus '" + name + "'");
+  FaultList faults("stimulus '" + before.name + "'");
   ObjectReader reader(value, "", faults);
-  std::string same_name;
-  reader.name("name", same_name);
-  stimuli::Material material = protocol.material;
-  reader.section("material", [&](ObjectReader& section) { read_material(section, material); });
-  stimuli::ObjectSpec object = read_object(reader, material, files);
-  reader.refuse_unknown_keys();
+  StimulusSpec read = read_stimulus(reader, protocol.material, files);
   faults.throw_if_any();
-  return object;
+  return read;
 }
 
 /// Endings of names, and the unit that each stands for.
@@ -112,7 +114,9 @@ StimulusSpec at_level(const Protocol& protocol, const TaskBlock& block, int stim
     throw InputError({{"stimulus '" + plain.name + "'", block.level->pointer,
                        "expected a number of the stimulus; it has none here", 0}});
   }
-  varied.object = read_again(value, protocol, plain.object, plain.name);
+  StimulusSpec read = read_again(value, protocol, plain);
+  varied.object = std::move(read.object);
+  varied.seen = std::move(read.seen);
   return varied;
 }
 

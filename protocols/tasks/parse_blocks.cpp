@@ -420,6 +420,11 @@ void read_compare(ObjectReader& reader, const Protocol& protocol, TaskBlock& blo
   reader.integer("intervals", block.intervals, {2, 3});
   reader.choice("answer", block.same_different, {{"interval", false}, {"same_different", true}});
   reader.choice("asks", block.asks_smaller, {{"larger", false}, {"smaller", true}});
+  using IntervalsSeen = TaskBlock::IntervalsSeen;
+  reader.choice("intervals_seen", block.intervals_seen,
+                {{"both", IntervalsSeen::both},
+                 {"standard", IntervalsSeen::standard},
+                 {"comparison", IntervalsSeen::comparison}});
   reader.number("inter_interval_s", block.inter_interval, kWait);
   reader.number("interval_limit_s", block.interval_limit, kPresentation);
   if (block.same_different) block.catch_trials = 0.5;

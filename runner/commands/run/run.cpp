@@ -248,6 +248,15 @@ bool asks_for_consent(const protocols::Protocol& protocol) {
   });
 }
 
+/// \throws UsageError: this display cannot show what the protocol lets the participant see
+void require_sight(const protocols::Protocol& protocol) {
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
+    if (stimulus.seen && stimulus.seen->anything())
+      throw UsageError("stimulus '" + printable(stimulus.name) +
+                       "' is seen, and nothing is drawn for a participant yet: simulate runs it");
+  }
+}
+
 bool has_joystick(const station::RunSettings& settings, const protocols::Protocol& protocol) {
   return !protocol.responses.joystick.empty() && !settings.no_window;
 }
@@ -292,6 +301,7 @@ int run_command(const std::vector<std::string>& args) {
       asks != nullptr && settings.advisor.empty())
     throw UsageError("block '" + asks->name +
                      "' asks a program for its levels: expected --ask SOCKET");
+  require_sight(admission.protocol);
   settings.participant = admission.participant;
   protocols::Protocol& protocol = admission.protocol;
   translate_texts(settings, admission);
