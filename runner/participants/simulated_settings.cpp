@@ -96,6 +96,8 @@ constexpr std::array kRanges = {
     Range{"/device/max_force_n", kAbove, 0, 1000},
     Range{"/device/max_stiffness_n_per_m", kAbove, 0, 1e6},
     Range{"/device/workspace_radius_m", kAbove, 0, 10},
+    Range{"/cues/weber_v", kAbove, 0, 10},
+    Range{"/cues/p_common", kFrom, 0, 1},
     Range{"/between_participants/slide_speed_log_sd", kFrom, 0, 3},
     Range{"/between_participants/percept_noise_log_sd", kFrom, 0, 3},
     Range{"/between_participants/reaction_delay_log_sd", kFrom, 0, 3},
@@ -150,6 +152,10 @@ const char* const kBeforeVersion3 = R"({
   "heading": {"chosen": false, "interval_s": 0.3, "turning_time_s": 0.1, "hypotheses": 32, "headings": 8,
               "places": 2, "look_ahead_m": 0.02}
 })";
+// Things can be seen in every version; no frozen file has these keys.
+const char* const kOfSight = R"({
+  "cues": {"rule": "optimal", "weber_v": 0.05, "p_common": 1}
+})";
 const char* const kBeforeVersion2 = R"({
   "search": {"after_loss": "press-on", "pull_to_centre_per_s": 15}
 })";
@@ -159,7 +165,8 @@ const std::map<std::string, std::vector<std::string>>& words() {
   static const std::map<std::string, std::vector<std::string>> kWords = {
       {"/percept/place", {"tip", "surface"}},
       {"/observer/evidence", {"percept", "movement"}},
-      {"/search/after_loss", {"press-on", "turn-to-centre"}}};
+      {"/search/after_loss", {"press-on", "turn-to-centre"}},
+      {"/cues/rule", {"optimal", "best", "switch", "causal"}}};
   return kWords;
 }
 
@@ -173,8 +180,8 @@ json frozen_settings(int version) {
 
 /// The settings of a version for keys that its file lacks.
 json implied_settings(int version) {
-  json implied = json::object();
-  if (version < 3) implied = read_json(kBeforeVersion3);
+  json implied = read_json(kOfSight);
+  if (version < 3) implied.merge_patch(read_json(kBeforeVersion3));
   if (version < 2) {
     implied.merge_patch(read_json(kBeforeVersion2));
     implied["search"].erase("pull_to_centre");  // version 2 has its own
@@ -254,6 +261,15 @@ HeadingSettings read_heading(const json& heading) {
   return s;
 }
 
+CueSettings read_cues(const json& cues) {
+  using Rule = CueSettings::Rule;
+  static const std::map<std::string, Rule> kRules = {{"optimal", Rule::optimal},
+                                                     {"best", Rule::best},
+                                                     {"switch", Rule::switching},
+                                                     {"causal", Rule::causal}};
+  return {kRules.at(cues.at("rule").get<std::string>()), cues.at("weber_v"), cues.at("p_common")};
+}
+
 /// SHA-256 of complete settings. Keys unknown to their version count only if they differ from its
 /// behaviour, so the checksum of unpatched settings is that of the frozen file without spaces.
 std::string settings_checksum(json settings) {
@@ -311,6 +327,7 @@ SimulatedSettings read(const json& j) {
   s.between = {between.at("slide_speed_log_sd"), between.at("percept_noise_log_sd"),
                between.at("reaction_delay_log_sd"), between.at("non_decision_log_sd"),
                between.at("threshold_logit_sd")};
+  s.cues = read_cues(j.at("cues"));
   return s;
 }
 

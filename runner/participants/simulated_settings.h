@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "runner/devices/simulated.h"
+#include "runner/participants/cue_combination.h"
 #include "runner/participants/heading_choice.h"
 #include "runner/participants/shape_observer.h"
 
@@ -84,6 +85,7 @@ struct SimulatedSettings {
     double slide_speed, percept_noise, reaction_delay, non_decision;  ///< sd of the log
     double threshold;                                                 ///< sd of the logit
   } between;
+  CueSettings cues;    ///< where things are seen
   std::string sha256;  ///< of the settings used, patch included
   /// Of groups of participants that differ, by name; the checksum is that of the whole settings.
   std::map<std::string, std::shared_ptr<const SimulatedSettings>> groups;

@@ -6,6 +6,7 @@
 #include <glm/geometric.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <limits>
+#include <numbers>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -55,6 +56,8 @@ double distance_to(const stimuli::ObjectSpec& object, const Vec3& point) {
 bool is_length(const std::string& pointer) {
   return pointer.ends_with("_m") || pointer.find("_m/") != std::string::npos;
 }
+
+constexpr double kRadian = std::numbers::pi / 180;
 
 constexpr double kPlannedLook = 0.3;  // s, where a plan says nothing of times
 constexpr double kLook = 1.5;         // s of exploration in each interval after the first contact
@@ -203,6 +206,7 @@ void TaskJudgement::begin(const protocols::Trial& trial, const Random& random) {
   own_.reset();
   turns_ = 1;
   standard_.reset();
+  look_.reset();
   evidence_ = 0;
 }
 
@@ -241,7 +245,62 @@ double TaskJudgement::noise_of_difference(double reference) const {
   return settings_.weber * std::max(std::abs(levels.front()), std::abs(levels.back()));
 }
 
-void TaskJudgement::feel(const protocols::Interval& interval, const Felt& felt) {
+/// What is seen of an interval.
+struct TaskJudgement::Sight {
+  bool felt = true;                            ///< the stimulus gives force
+  std::optional<double> level = std::nullopt;  ///< none: nothing is seen of it
+  double sd = 0, lag = 0;
+};
+
+TaskJudgement::Sight TaskJudgement::sight_of(const protocols::Interval& interval) const {
+  Sight out;
+  if (!protocol_.view || interval.stimulus < 0) return out;
+  const TaskBlock& asked = block();
+  const protocols::StimulusSpec shown =
+      interval.level && asked.level
+          ? protocols::at_level(protocol_, asked, interval.stimulus, *interval.level)
+          : protocol_.stimuli[static_cast<std::size_t>(interval.stimulus)];
+  out.felt = shown.felt;
+  if (!shown.seen || !shown.seen->object || !protocols::is_seen(asked, interval)) return out;
+  const double level = level_of(interval);
+  const std::string& pointer = asked.level ? asked.level->pointer : "";
+  double seen = level, blur = 0;
+  if (pointer == "/stiffness_n_per_m") {
+    seen = shown.seen->give_stiffness.value_or(level);
+  } else if (is_length(pointer)) {
+    seen = level * shown.seen->size_ratio;
+    const double distance = glm::distance(protocol_.view->eye, protocol_.workspace.centre);
+    blur = std::tan(shown.seen->blur_deg * kRadian) * distance * protocol_.workspace.scale;
+  }
+  out.felt = out.felt && !pointer.starts_with("/seen/");
+  out.level = seen;
+  out.sd = std::hypot(cues_.weber_v * seen, blur);
+  out.lag = shown.seen->delay;
+  return out;
+}
+
+/// Draws nothing where nothing is seen. \param sd  of the felt estimate
+double TaskJudgement::with_sight(const protocols::Interval& interval, std::optional<double> felt,
+                                 double sd) {
+  const Sight sight = sight_of(interval);
+  if (!sight.level) return felt.value_or(last_level_);
+  if (!sight.felt) felt.reset();
+  CueEstimates estimates;
+  estimates.felt = felt;
+  estimates.felt_sd = sd;
+  estimates.seen = *sight.level + sight.sd * random_.normal();
+  estimates.seen_sd = sight.sd;
+  estimates.lag = sight.lag;
+  if (const auto levels = protocols::levels_of(block()); !levels.empty())
+    estimates.range = levels.back() - levels.front();
+  if (!look_) look_ = random_.unit();
+  estimates.looks = *look_ < weight_of_seen(sd, sight.sd);
+  touched_ = true;
+  return combined_estimate(cues_, estimates);
+}
+
+void TaskJudgement::feel(const protocols::Interval& interval, const Felt& given) {
+  const Felt felt = protocol_.view ? Felt{std::nullopt, false, given.touched} : given;
   measured_ = felt.measured.has_value();
   touched_ = felt.touched;
   last_level_ = felt.measured.value_or(level_of(interval));
@@ -260,7 +319,11 @@ void TaskJudgement::feel(const protocols::Interval& interval, const Felt& felt) 
     last_level_ = levels.front() + random_.unit() * (levels.back() - levels.front());
   const double sd = felt.noisy ? 0 : noise_of_difference(reference) / std::sqrt(2.0);
   const double less = interval.standard ? 0 : settings_.shift * noise_of_difference(reference);
-  const double estimate = last_level_ - less + sd * random_.normal();
+  double estimate = last_level_ - less + sd * random_.normal();
+  if (protocol_.view) {
+    const auto touched = felt.touched ? std::optional<double>(estimate) : std::nullopt;
+    estimate = with_sight(interval, touched, sd);
+  }
   estimates_.push_back(estimate);
   (interval.standard ? standard_ : own_) = estimate;
   if (!interval.standard) shown_ = level_of(interval);
@@ -418,7 +481,7 @@ TaskParticipant::TaskParticipant(const SimulatedSettings& own, const ShapeHypoth
       hand_(own, hypotheses, stylus, protocol, seed, number),
       of_blocks_(of_blocks),
       reacher_({}, own.hand, stylus, protocol, seed, number),
-      judgement_(protocol, {}),
+      judgement_(protocol, {}, own.cues),
       planned_(std::move(planned)),
       percept_(protocol),
       seed_(seed),
@@ -506,7 +569,9 @@ std::optional<Answer> TaskParticipant::step(const servo::Sample& sample) {
   if (hand_.percept()) percept_.add(*hand_.percept());
   const double time = sample.tick * period_;
   const double longest = look_ < kLook ? look_ : kLongestLook;
-  const bool enough = percept_.contact_ticks() * period_ >= look_ / 3 && time >= look_;
+  const bool felt = view_.shown->stimulus < 0 ||
+                    protocol_.stimuli[static_cast<std::size_t>(view_.shown->stimulus)].felt;
+  const bool enough = time >= look_ && (!felt || percept_.contact_ticks() * period_ >= look_ / 3);
   if (judged_ || (!enough && time < longest)) return std::nullopt;
   judged_ = true;
   const std::optional<double> length = percept_.length();

@@ -14,6 +14,7 @@
 #include "data/base/random.h"
 #include "protocols/protocol.h"
 #include "protocols/schedule.h"
+#include "runner/participants/cue_combination.h"
 #include "runner/participants/reacher.h"
 #include "runner/participants/respondent.h"
 #include "runner/participants/shape_observer.h"
@@ -38,6 +39,10 @@ namespace palpate::runner::participants {
 //   identify  stimuli that differ in stiffness only: the nearest stiffness, as a ratio, to the
 //             estimate; shapes: SimulatedParticipant; else correct, except for lapses
 // With probability `lapse` the answer is random.
+//
+// Where a protocol has a view, the felt estimate is the true level with that noise, whatever the
+// hand measured, so that its sd is known; what is seen of an interval gives a second estimate, and
+// both are combined (cue_combination.h). Blur adds to its sd where the level is a length.
 
 // Estimates a level from exploration: one estimate for each interval.
 //
@@ -117,8 +122,9 @@ using JudgementOf = std::function<JudgementSettings(int, const protocols::Trial&
 class TaskJudgement {
  public:
   /// \param protocol  must outlive it
-  TaskJudgement(const protocols::Protocol& protocol, const JudgementSettings& settings)
-      : protocol_(protocol), settings_(settings) {}
+  TaskJudgement(const protocols::Protocol& protocol, const JudgementSettings& settings,
+                const CueSettings& cues = {})
+      : protocol_(protocol), settings_(settings), cues_(cues) {}
 
   void set(const JudgementSettings& settings) { settings_ = settings; }
   /// Before the first interval of a trial.
@@ -148,9 +154,14 @@ class TaskJudgement {
   int rated(std::uint64_t steps);
   double noise_of_difference(double reference) const;
   double planned_noise(double noise, double reference) const;
+  struct Sight;
+  Sight sight_of(const protocols::Interval& interval) const;
+  double with_sight(const protocols::Interval& interval, std::optional<double> felt, double sd);
 
   const protocols::Protocol& protocol_;
   JudgementSettings settings_;
+  CueSettings cues_;
+  std::optional<double> look_;  ///< switching: drawn once a trial, 0 to 1
   protocols::Trial trial_;
   Random random_{0};
   std::vector<double> estimates_;         ///< of the intervals so far
