@@ -28,6 +28,7 @@
 #include "runner/movement/movement_study.h"
 #include "runner/output/outputs.h"
 #include "runner/registration/bundle_contents.h"
+#include "runner/study/cue_study.h"
 #include "runner/study/study_trials.h"
 
 namespace palpate::runner::commands {
@@ -102,6 +103,20 @@ std::vector<analysis::ProtocolText> protocols_in(const std::string& file) {
   return {{json.value("name", ""), checksum_hex(text), text, stored.title, stored.seed}};
 }
 
+void analyze_cues_of(const study::Study& study, output::Outputs& outputs) {
+  const study::CueStudy cues = study::analyze_cues(study, {});
+  if (outputs.wanted("json")) outputs.put("json", analysis::cue_json(cues.analysis, cues.source));
+  if (outputs.wanted("report"))
+    outputs.put("report", analysis::cue_html(cues.analysis, cues.source));
+  if (outputs.wanted("figures")) {
+    for (const analysis::Figure& figure : analysis::cue_figures(cues.analysis))
+      outputs.put_into_folder(figure.id + ".svg",
+                              analysis::figure_svg(figure, analysis::light_palette()));
+  }
+  outputs.write();
+  std::cout << analysis::cue_text(cues.analysis);
+}
+
 /// Checks the options of --movement and those that exclude it.
 void check_movement(const boost::program_options::variables_map& values, double cutoff, int jobs) {
   if (!values.count("movement")) {
@@ -166,7 +181,9 @@ int analyze_command(const std::vector<std::string>& args) {
       "       [--json FILE] [--report FILE.html] [--figures DIR] [--force]\n"
       "palpate analyze --db FILE --movement [--protocol NAME] [--movement-csv FILE]\n"
       "       [--cutoff-hz F] [--jobs J] [--meshes DIR] [--json FILE] [--report FILE.html]\n"
-      "       [--figures DIR] [--force]";
+      "       [--figures DIR] [--force]\n"
+      "palpate analyze (--db FILE | --csv FILE --design FILE) --cues [--protocol NAME]\n"
+      "       [--json FILE] [--report FILE.html] [--figures DIR] [--force]";
   line.summary =
       "Compares response times with the ray and the point renderer: percent reduction for each\n"
       "shape with intervals and tests, accuracy, learning and exclusions. In data with other\n"
@@ -177,7 +194,9 @@ int analyze_command(const std::vector<std::string>& args) {
       "For protocols of version 2 (databases, exports with a column 'task'): thresholds, PSE and\n"
       "JND, d', magnitude estimation, adjustment, information and confidence, by task.\n"
       "With --movement: measures of the hand's movement (path, speed, smoothness, contact,\n"
-      "force, strokes, procedures, coverage), from the servo samples of a database.";
+      "force, strokes, procedures, coverage), from the servo samples of a database.\n"
+      "With --cues: weights of what is seen and felt, JNDs with one cue and with both, and rival\n"
+      "models, for protocols with the key 'cues'.";
   line.example =
       "  palpate analyze --db study.db\n"
       "  palpate analyze --csv trials.csv --json analysis.json --report report.html\n"
@@ -186,6 +205,7 @@ int analyze_command(const std::vector<std::string>& args) {
       "  palpate analyze --db thresholds.db --function weibull\n"
       "  palpate analyze --db study.db --movement --movement-csv movement.csv\n"
       "  palpate analyze --db study.db --movement --report movement.html --figures figures\n"
+      "  palpate analyze --db size.db --cues --report cues.html\n"
       "  palpate analyze --sweep people.sweep --report people.html\n"
       "  palpate analyze --sweep people.sweep --pattern 'cone > 5 && cone > 2 * abs(sphere)'\n"
       "      (names: shapes, for their gains in percent, and columns of the CSV, such as delay or\n"
@@ -220,6 +240,7 @@ int analyze_command(const std::vector<std::string>& args) {
   movement::MovementRequest movement;
   movement.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   std::string movement_csv;
+  add("cues", "compare what is seen and felt, as the protocol's key 'cues' says");
   add("movement", "measure the movement of the hand instead of the times");
   add("movement-csv", po::value(&movement_csv)->value_name("FILE"),
       "with --movement: write every measure, a row a trial");
@@ -244,6 +265,18 @@ int analyze_command(const std::vector<std::string>& args) {
     const std::string text = analyze_sweep_file(sweep, pattern, outputs);
     outputs.write();
     std::cout << text;
+    return 0;
+  }
+  if (values->count("cues")) {
+    for (const char* option : {"movement", "sweep", "scale"}) {
+      if (values->count(option)) throw UsageError("--cues: not with --" + std::string(option));
+    }
+    if (!(*values)["function"].defaulted() || !(*values)["too-fast-s"].defaulted())
+      throw UsageError("--function, --too-fast-s: do not go with --cues");
+    std::vector<analysis::ProtocolText> protocols = protocols_in(design);
+    study::Study study = study::read_study({database, csv, protocol, protocols}, true);
+    if (!csv.empty()) study.record.protocols = std::move(protocols);
+    analyze_cues_of(study, outputs);
     return 0;
   }
   if (values->count("movement")) {

@@ -22,6 +22,7 @@
 #include "analysis/text.h"
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
+#include "runner/commands/plan/plan_cues.h"
 #include "runner/commands/plan/plan_groups.h"
 #include "runner/commands/shared/command.h"
 #include "runner/output/outputs.h"
@@ -36,7 +37,8 @@ namespace {
 struct ThresholdOptions {
   /// Of one of kMeasureOptions.
   double jnd = 0, pse = 0, threshold = 0, accuracy_points = 0, rating = 0, exponent = 0;
-  double weber = 0.1, participant_sd = 0.3, effect_sd = 0.2, pse_sd = 0.5, reach = 2.5;
+  std::string weber = "0.1";  ///< with --cues two
+  double participant_sd = 0.3, effect_sd = 0.2, pse_sd = 0.5, reach = 2.5;
   double accuracy = 0.8, equivalence = 0;
 };
 
@@ -211,6 +213,14 @@ void require_effect(const MeasureOption& option, double effect, double accuracy)
   }
 }
 
+/// NaN: it is no number.
+double number_of(const std::string& text) {
+  double value = 0;
+  const char* const end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data(), end, value);
+  return error == std::errc() && stop == end ? value : std::nan("");
+}
+
 analysis::ThresholdStudy study_of(const ThresholdOptions& thresholds, const MeasureOption& measure,
                                   const PlanOptions& options, const po::variables_map& values) {
   const auto within = [](double value, double low, double high) {
@@ -219,7 +229,8 @@ analysis::ThresholdStudy study_of(const ThresholdOptions& thresholds, const Meas
   require(within(thresholds.accuracy, 0.05, 0.98), "accuracy", "a share from 0.05 to 0.98");
   const double effect = thresholds.*measure.effect;
   require_effect(measure, effect, thresholds.accuracy);
-  require(within(thresholds.weber, 0.001, 1), "weber", "a JND / standard from 0.001 to 1");
+  const double weber = number_of(thresholds.weber);
+  require(within(weber, 0.001, 1), "weber", "a JND / standard from 0.001 to 1");
   require(within(thresholds.participant_sd, 0, 2), "jnd-sd", "0 to 2");
   require(within(thresholds.effect_sd, 0, 2), "jnd-effect-sd", "0 to 2");
   require(within(thresholds.pse_sd, 0, 5), "pse-sd", "0 to 5 JNDs");
@@ -227,7 +238,7 @@ analysis::ThresholdStudy study_of(const ThresholdOptions& thresholds, const Meas
   require(within(options.alpha, 1e-6, 0.5), "alpha", "0.000001 to 0.5");
   require(within(options.power, 0.01, 0.999), "power", "0.01 to 0.999");
   analysis::ThresholdStudy study;
-  study.weber_fraction = thresholds.weber;
+  study.weber_fraction = weber;
   study.measure = measure.measure;
   study.effect = on_scale(measure.measure, effect);
   study.accuracy = thresholds.accuracy;
@@ -278,8 +289,12 @@ void add_threshold_options(CommandLine& line, ThresholdOptions& options) {
       "show equivalence within this bound instead, in the unit of the effect; with an effect of 0");
   add("accuracy", po::value(&options.accuracy)->default_value(0.8, "0.8")->value_name("SHARE"),
       "correct with the first condition");
-  add("weber", po::value(&options.weber)->default_value(0.1, "0.1")->value_name("W"),
-      "JND / standard with the first condition");
+  add("weber", po::value(&options.weber)->default_value("0.1")->value_name("W"),
+      "JND / standard with the first condition; with --cues FELT,SEEN: standard deviations of a "
+      "single estimate / standard");
+  add("cues",
+      "plan a study of seen and felt cues: gain over the better cue, and what --participants "
+      "people (12) with --trials at a level (30) can show of it");
   add("jnd-sd", po::value(&options.participant_sd)->default_value(0.3, "0.3")->value_name("SD"),
       "of participants' log JND, threshold or exponent; of log odds and ratings 0.7");
   add("jnd-effect-sd", po::value(&options.effect_sd)->default_value(0.2, "0.2")->value_name("SD"),
@@ -528,6 +543,7 @@ int plan_command(const std::vector<std::string>& args) {
            --accuracy-effect POINTS | --rating-effect STEPS | --exponent-effect PERCENT)
            [--equivalence BOUND]
        palpate plan --groups N (--effect-between PERCENT | --effect-interaction PERCENT) ...
+       palpate plan --cues --weber FELT,SEEN [--participants N] [--trials N] [--studies N]
        palpate plan --coverage [--studies N] [--seed S])";
   line.summary =
       "Sample size planning: the number of participants and trials that find an effect with a\n"
@@ -539,6 +555,7 @@ int plan_command(const std::vector<std::string>& args) {
       --trials 20,40 --json plan.json --figure power.svg
   palpate plan --jnd-effect 20 --weber 0.1 --trials 70,140 --participants 6-30   (thresholds)
   palpate plan --groups 2 --effect-between 20 --gain-sd 0.15 --residual-sd 0.5 --participants 4-60
+  palpate plan --cues --weber 0.06,0.09 --participants 12 --trials 30
   palpate plan --coverage --studies 500 --seed 1)";
   PlanOptions options;
   add_plan_options(line, options);
@@ -567,6 +584,7 @@ int plan_command(const std::vector<std::string>& args) {
     print_coverage(options, *values, outputs);
     return 0;
   }
+  if (values->count("cues")) return print_cue_plan(thresholds.weber, options, *values, outputs);
   if (values->count("groups")) {
     print_group_plan(groups, options, *values, outputs);
     return 0;

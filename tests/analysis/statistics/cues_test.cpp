@@ -1,0 +1,190 @@
+// Combination of what is felt and seen, against closed forms and people of known rules.
+
+#include "analysis/statistics/cues.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <vector>
+
+#include "analysis/statistics/cue_plan.h"
+#include "data/base/random.h"
+
+namespace palpate::analysis {
+namespace {
+
+constexpr double kHaptic = 0.09, kVisual = 0.06, kQuartile = 0.6744897501960817;
+
+double phi(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
+
+/// A person of a rule, whose standard is 1.
+struct Person {
+  CueModel rule = CueModel::optimal;
+  double weight = 0.5, sd = 0.05;  ///< of the free rule
+  double lapse = 0;
+
+  double chosen(double level, double conflict) const {
+    const CueOptimum best = optimum_of(kHaptic, kVisual);
+    const auto single = [&](double mu, double s) {
+      return phi((level - mu) / (std::numbers::sqrt2 * s));
+    };
+    switch (rule) {
+      case CueModel::optimal:
+        return single(1 + conflict * (best.weight - 0.5), best.sd);
+      case CueModel::best_cue:
+        return single(1 + conflict / 2, kVisual);
+      case CueModel::equal_weights:
+        return single(1, 0.5 * std::hypot(kHaptic, kVisual));
+      case CueModel::free_weight:
+        return single(1 + conflict * (weight - 0.5), best.sd);
+      case CueModel::free:
+        return single(1 + conflict * (weight - 0.5), sd);
+      case CueModel::switching:
+        return weight * single(1 + conflict / 2, kVisual) +
+               (1 - weight) * single(1 - conflict / 2, kHaptic);
+    }
+    return 0.5;
+  }
+};
+
+/// \param expected  the expected shares, rounded to whole answers; false: drawn
+std::vector<LevelCount> counts_of(const std::function<double(double)>& chosen, int trials,
+                                  double lapse, bool expected, Random& random) {
+  std::vector<LevelCount> out;
+  for (int i = -3; i <= 3; ++i) {
+    LevelCount count{1 + 0.06 * i, trials, 0};
+    const double p = lapse + (1 - 2 * lapse) * chosen(count.level);
+    if (expected) {
+      count.successes = static_cast<int>(std::lround(trials * p));
+    } else {
+      for (int t = 0; t < trials; ++t) count.successes += random.unit() < p ? 1 : 0;
+    }
+    out.push_back(count);
+  }
+  return out;
+}
+
+CueAnswers answers_of(const Person& person, int trials, bool expected, Random& random,
+                      const std::vector<double>& conflicts = {-0.08, 0, 0.08}) {
+  CueAnswers out;
+  out.participant = "P";
+  const auto single = [](double sd) {
+    return [sd](double x) { return phi((x - 1) / (std::numbers::sqrt2 * sd)); };
+  };
+  out.haptic = counts_of(single(kHaptic), trials, person.lapse, expected, random);
+  out.visual = counts_of(single(kVisual), trials, person.lapse, expected, random);
+  for (const double d : conflicts) {
+    const auto both = [&](double x) { return person.chosen(x, d); };
+    out.both.push_back({"", d, 1, counts_of(both, trials, person.lapse, expected, random)});
+  }
+  return out;
+}
+
+TEST(Cues, OptimumIsTheClosedForm) {
+  const CueOptimum best = optimum_of(3, 4);
+  EXPECT_NEAR(best.weight, 9.0 / 25, 1e-15);
+  EXPECT_NEAR(best.sd, 12.0 / 5, 1e-15);
+  EXPECT_LT(best.sd, 3);
+}
+
+TEST(Cues, GainOverTheBetterCueFollowsTheRatio) {
+  const std::vector<std::pair<double, double>> known = {
+      {1, 29.3}, {1.25, 21.9}, {1.5, 16.8}, {2, 10.6}, {3, 5.1}};
+  for (const auto& [ratio, percent] : known)
+    EXPECT_NEAR(100 * gain_over_better(ratio), percent, 0.05) << ratio;
+}
+
+TEST(Cues, ExpectedAnswersGiveTheTrueFigures) {
+  Random random(1);
+  const CueAnswers answers = answers_of({}, 2'000'000, true, random);
+  const CueParticipant found = analyze_cues(answers, {.resamples = 0}, 0);
+  ASSERT_EQ(found.undefined, "");
+  const CueOptimum best = optimum_of(kHaptic, kVisual);
+  const double jnd = kQuartile * std::numbers::sqrt2;
+  EXPECT_NEAR(found.weight_visual, best.weight, 2e-3);
+  EXPECT_NEAR(found.weight_predicted, best.weight, 2e-3);
+  EXPECT_NEAR(found.jnd_haptic, jnd * kHaptic, 1e-4);
+  EXPECT_NEAR(found.jnd_visual, jnd * kVisual, 1e-4);
+  EXPECT_NEAR(found.jnd_both, jnd * best.sd, 1e-4);
+  EXPECT_NEAR(found.jnd_predicted, jnd * best.sd, 1e-4);
+  EXPECT_EQ(found.jnd_better, std::min(found.jnd_haptic, found.jnd_visual));
+}
+
+TEST(Cues, EachRuleIsFoundInMostPeople) {
+  const std::vector<Person> people = {{.rule = CueModel::optimal},
+                                      {.rule = CueModel::best_cue},
+                                      {.rule = CueModel::free_weight, .weight = 0.2},
+                                      {.rule = CueModel::free, .weight = 0.3, .sd = 0.12},
+                                      {.rule = CueModel::switching, .weight = 0.5}};
+  constexpr int kPeople = 20, kTrials = 300;
+  const std::vector<double> far = {-0.2, 0, 0.2};
+  for (const Person& person : people) {
+    int found = 0;
+    for (int i = 0; i < kPeople; ++i) {
+      Random random(7, {static_cast<std::uint64_t>(person.rule), static_cast<std::uint64_t>(i)});
+      const CueAnswers answers = answers_of(person, kTrials, false, random, far);
+      found += analyze_cues(answers, {.resamples = 0}, 0).best == person.rule ? 1 : 0;
+    }
+    EXPECT_GE(found, 16) << to_string(person.rule);
+  }
+}
+
+TEST(Cues, SmallerOfTwoIsFreedOfItsBias) {
+  // Two cues alike: the smaller of two estimates is too small, the corrected one is not.
+  double plain = 0, corrected = 0;
+  constexpr int kPeople = 40;
+  for (int i = 0; i < kPeople; ++i) {
+    Random random(3, {static_cast<std::uint64_t>(i)});
+    CueAnswers answers = answers_of({}, 20, false, random);
+    const auto alike = [](double x) { return phi((x - 1) / (std::numbers::sqrt2 * kHaptic)); };
+    answers.visual = counts_of(alike, 20, 0, false, random);
+    const CueParticipant one = analyze_cues(answers, {.resamples = 200, .models = false}, 0);
+    const double truth = kQuartile * std::numbers::sqrt2 * kHaptic;
+    plain += std::log(std::min(one.jnd_haptic, one.jnd_visual) / truth) / kPeople;
+    corrected += std::log(one.jnd_better / truth) / kPeople;
+  }
+  EXPECT_LT(plain, -0.06);
+  EXPECT_LT(std::abs(corrected), std::abs(plain) / 2);
+}
+
+TEST(Cues, ReportedSlopeIsThatOfOneConflict) {
+  Random random(1);
+  Person person{.rule = CueModel::free, .weight = 0.7, .sd = 0.06};
+  const CueAnswers answers = answers_of(person, 1'000'000, true, random, {0.08});
+  const CueParticipant found = analyze_cues(answers, {.resamples = 0, .models = false}, 0);
+  EXPECT_NEAR(found.weight_visual, 0.7, 2e-3);
+}
+
+TEST(Cues, WithoutConflictThereIsNoWeight) {
+  Random random(1);
+  const CueAnswers answers = answers_of({}, 20, true, random, {0});
+  EXPECT_EQ(analyze_cues(answers, {}, 0).undefined, "no block has a conflict");
+  CueAnswers none = answers;
+  none.visual.clear();
+  const CueAnalysis all = analyze_all_cues({answers, none}, {});
+  EXPECT_EQ(all.left_out.size(), 2U);
+  EXPECT_NE(all.weight.test.undefined, "");
+}
+
+TEST(Cues, PlanTellsRulesApart) {
+  CuePlanSettings settings;
+  settings.haptic = 0.06;
+  settings.visual = 0.09;
+  settings.studies = 12;
+  settings.resamples = 20;
+  settings.jobs = 2;
+  const std::vector<CuePlanResult> results = plan_cues(settings);
+  ASSERT_EQ(results.size(), 2U);
+  EXPECT_LT(std::abs(results[0].weight_difference), 0.03);
+  EXPECT_LE(results[0].weight_rejected, 3.0 / 12);
+  // People who use the felt alone weigh the seen by 0, not by 0.31.
+  EXPECT_NEAR(results[1].weight_difference, -0.3, 0.12);
+  EXPECT_GT(results[1].jnd_by_predicted, 0.12);
+  settings.jobs = 1;
+  EXPECT_EQ(plan_cues(settings)[1].weight_difference, results[1].weight_difference);
+}
+
+}  // namespace
+}  // namespace palpate::analysis
