@@ -116,6 +116,14 @@ struct Page {
   std::optional<ReachPicture> reach{};
 };
 
+struct SeenTrial;
+
+/// A frame of what is seen. Session clock.
+struct SeenFrame {
+  std::int64_t swap_ns = 0;  ///< after the driver had drawn it
+  std::int64_t pose_ns = 0;  ///< of the tick whose pose is drawn
+};
+
 struct KeyPress {
   /// As in the protocol: "1", "a", "space", "escape", "wheel up"; the numeric pad as digits. While
   /// an answer is typed: the character in UTF-8.
@@ -127,6 +135,12 @@ class ParticipantScreen {
  public:
   virtual ~ParticipantScreen() = default;
   virtual void show(const Page& page) = 0;
+  /// From now on draws this behind the pages; null: nothing. A screen of text draws nothing.
+  virtual void see(std::shared_ptr<const SeenTrial> /*trial*/) {}
+  /// Passes a tick of the trial that is seen.
+  virtual void follow(const servo::Sample& /*sample*/) {}
+  /// The frames since the last call.
+  virtual std::vector<SeenFrame> frames() { return {}; }
   /// Keys pressed since the last call, in order of arrival.
   virtual std::vector<KeyPress> keys() = 0;
   /// False once the user has closed it or its display was lost.

@@ -17,6 +17,7 @@
 #include "runner/display/display.h"
 #include "runner/display/key_names.h"
 #include "runner/display/page_elements.h"
+#include "runner/display/seen_painter.h"
 #include "runner/display/text_block.h"
 #include "runner/display/window.h"
 #include "runner/display/x11_errors.h"
@@ -68,12 +69,15 @@ void draw_text(cairo_t* canvas, const std::string& text, double size, double sma
 /// Positions of a page's elements for a screen size.
 class PageLayout {
  public:
-  PageLayout(cairo_t* canvas, const Page& page, double width, double height, double ui_scale)
+  PageLayout(cairo_t* canvas, const Page& page, double width, double height,
+             const PageOptions& options)
       : canvas_(canvas),
         page_(page),
         width_(width),
+        over_scene_(options.over_scene),
+        height_(height),
         unit_(std::max({2.0, std::min(height / 34, width / 46),
-                        std::min({kSmallestUnit * ui_scale, height / 16, width / 20})})),
+                        std::min({kSmallestUnit * options.ui_scale, height / 16, width / 20})})),
         keys_(canvas, page, unit_, 0.94 * width, kMostKeys * height) {
     const double margin = 2.5 * unit_;
     const bool continues = page.kind == Page::Kind::text;
@@ -99,6 +103,7 @@ class PageLayout {
   }
 
   void draw(int screen) const {
+    if (over_scene_) draw_bands();
     const auto last = static_cast<int>(screens().size()) - 1;
     const bool answers = !page_.keys.empty() && screen >= last;
     if (answers || page_.kind != Page::Kind::text)
@@ -120,18 +125,31 @@ class PageLayout {
     } else if (page_.kind == Page::Kind::checklist) {
       draw_checklist(canvas_, page_.checklist, unit_, width_, top_, room_);
     } else {
-      constexpr double kWordsAbove = 0.15;  // share of the room, above a movement's picture
-      const double words = page_.reach ? kWordsAbove * room_ : room_;
+      const bool above = page_.reach || over_scene_;  // the words stand above a picture
+      const double words = above ? kWordsAbove * room_ : room_;
       if (page_.reach)
         draw_reach(canvas_, *page_.reach, page_.go, width_ / 2, top_ + words, room_ - words);
       const bool large = page_.kind != Page::Kind::message;
-      const double letters = page_.kind == Page::Kind::feedback ? 8 : large ? 2.6 : 1.8;
+      const double letters = page_.kind == Page::Kind::feedback && !above ? 8 : large ? 2.6 : 1.8;
       draw_text(canvas_, page_.text, letters * unit_, kSmallestSize * unit_, width_,
                 text_width(width_, unit_), top_, words, page_.go ? kGo : kText, large);
     }
   }
 
  private:
+  static constexpr double kWordsAbove = 0.15;  // share of the room
+
+  /// What is behind the words and the keys is dark enough to read them.
+  void draw_bands() const {
+    constexpr double kDark = 0.8;
+    cairo_set_source_rgba(canvas_, kGround.red, kGround.green, kGround.blue, kDark);
+    cairo_rectangle(canvas_, 0, 0, width_, top_ + kWordsAbove * room_);
+    const double keys = page_.keys.empty() ? reply_top_ : keys_top_ - unit_;
+    if (!page_.keys.empty() || !page_.reply.empty())
+      cairo_rectangle(canvas_, 0, keys, width_, height_ - keys);
+    cairo_fill(canvas_);
+  }
+
   void draw_line(const std::string& text, double size, double top, const Colour& colour) const {
     TextBlock words(canvas_, text, size);
     while (words.size().width > 0.94 * width_ && size > kSmallestSize * unit_) {
@@ -161,7 +179,9 @@ class PageLayout {
 
   cairo_t* canvas_;
   const Page& page_;
-  double width_, unit_;
+  double width_;
+  bool over_scene_;
+  double height_, unit_;
   KeyMap keys_;
   double continue_top_ = 0, keys_top_ = 0, reply_top_ = 0, count_top_ = 0, top_ = 0, room_ = 0;
   double typed_top_ = 0, picture_ = 0, picture_top_ = 0;
@@ -173,15 +193,19 @@ Image draw_page(const Page& page, int width, int height, const PageOptions& sett
   Image image{std::max(width, 1), std::max(height, 1), {}};
   image.pixels.resize(static_cast<std::size_t>(image.width) * image.height);
   const std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)> surface(
-      cairo_image_surface_create_for_data(reinterpret_cast<unsigned char*>(image.pixels.data()),
-                                          CAIRO_FORMAT_RGB24, image.width, image.height,
-                                          4 * image.width),
+      cairo_image_surface_create_for_data(
+          reinterpret_cast<unsigned char*>(image.pixels.data()),
+          setting.over_scene ? CAIRO_FORMAT_ARGB32 : CAIRO_FORMAT_RGB24, image.width, image.height,
+          4 * image.width),
       &cairo_surface_destroy);
   const Canvas owned(cairo_create(surface.get()), &cairo_destroy);
-  set_colour(owned.get(), kGround);
-  cairo_paint(owned.get());
-  PageLayout(owned.get(), page, image.width, image.height, setting.ui_scale).draw(setting.screen);
+  if (!setting.over_scene) {
+    set_colour(owned.get(), kGround);
+    cairo_paint(owned.get());
+  }
+  PageLayout(owned.get(), page, image.width, image.height, setting).draw(setting.screen);
   cairo_surface_flush(surface.get());
+  if (setting.over_scene) return image;
   for (std::uint32_t& pixel : image.pixels) pixel |= 0xff000000U;
   return image;
 }
@@ -191,7 +215,7 @@ int screen_count(const Page& page, int width, int height, double ui_scale) {
   const std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)> surface(
       cairo_image_surface_create(CAIRO_FORMAT_RGB24, 1, 1), &cairo_surface_destroy);
   const Canvas owned(cairo_create(surface.get()), &cairo_destroy);
-  const PageLayout frame(owned.get(), page, std::max(width, 1), std::max(height, 1), ui_scale);
+  const PageLayout frame(owned.get(), page, std::max(width, 1), std::max(height, 1), {ui_scale});
   return static_cast<int>(frame.screens().size());
 }
 
@@ -217,11 +241,15 @@ ParticipantWindow::~ParticipantWindow() {
 }
 
 void ParticipantWindow::destroy() {
+  glfwMakeContextCurrent(window_);
+  painter_.reset();
   glfwDestroyWindow(window_);
   window_ = nullptr;
 }
 
 void ParticipantWindow::abandon() noexcept {
+  // Without a display OpenGL must not be called: leak what it holds.
+  static_cast<void>(painter_.release());
   window_ = nullptr;
   open_.store(false);
 }
@@ -297,24 +325,68 @@ bool ParticipantWindow::turn_page(const std::string& key) {
   return true;
 }
 
+void ParticipantWindow::see(std::shared_ptr<const SeenTrial> trial) {
+  last_moment_.reset();
+  trail_.clear();
+  to_see_.put(std::move(trial));
+}
+
+void ParticipantWindow::follow(const servo::Sample& sample) {
+  last_moment_ = moment_of(sample, last_moment_ ? &*last_moment_ : nullptr);
+  trail_.add(*last_moment_);
+}
+
+void ParticipantWindow::begin_seeing(std::shared_ptr<const SeenTrial> trial) {
+  scene_.reset();
+  if (trial == nullptr) return;
+  glfwMakeContextCurrent(window_);
+  if (painter_ == nullptr) painter_ = std::make_unique<SeenPainter>();
+  scene_.emplace(std::move(trial));
+}
+
 void ParticipantWindow::draw() {
+  bool changed = false;
   if (auto page = pages_.take()) {
     if (page->kind != page_.kind || page->text != page_.text || page->part != page_.part)
       screen_ = 0;
     page_ = std::move(*page);
-    needs_redraw_ = true;
-    image_ = {};
+    changed = true;
   }
   int width = 0, height = 0;
   glfwGetFramebufferSize(window_, &width, &height);
   if (width <= 0 || height <= 0 || was_destroyed(window_)) return;
+  if (auto trial = to_see_.take()) {
+    begin_seeing(std::move(*trial));
+    changed = true;
+  }
+  if (changed) image_ = {};
   if (image_.width != width || image_.height != height) {
     screens_ = screen_count(page_, width, height, ui_scale_);
     screen_ = std::min(screen_, screens_ - 1);
-    image_ = draw_page(page_, width, height, {ui_scale_, screen_});
-    needs_redraw_ = true;
+    image_ = draw_page(page_, width, height, {ui_scale_, screen_, scene_.has_value()});
+    changed = needs_redraw_ = true;
   }
-  if (needs_redraw_) paint(width, height);
+  if (scene_) {
+    paint_seen(width, height, changed);
+  } else if (needs_redraw_) {
+    paint(width, height);
+  }
+}
+
+/// Draws the pose of `delay_s` ago, as at the time of the frame.
+void ParticipantWindow::paint_seen(int width, int height, bool changed) {
+  glfwMakeContextCurrent(window_);
+  const std::int64_t now = settings_.clock->now_ns();
+  const auto delay = static_cast<std::int64_t>(std::llround(1e9 * scene_->trial().seen.delay));
+  const std::optional<SeenMoment> newest = trail_.newest();
+  const std::optional<SeenMoment> moment = trail_.at(now - delay);
+  SeenPainter::Frame frame{&*scene_, nullptr, now, newest && newest->forces};
+  if (moment && newest && is_visible(scene_->trial().seen, *newest)) frame.moment = &*moment;
+  painter_->paint(frame, image_, changed, width, height);
+  glfwSwapBuffers(window_);
+  glFinish();
+  needs_redraw_ = false;
+  if (frame.moment != nullptr) frames_.add({settings_.clock->now_ns(), moment->time_ns});
 }
 
 void ParticipantWindow::paint(int width, int height) {

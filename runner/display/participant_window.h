@@ -2,12 +2,15 @@
 
 #include <atomic>
 #include <cstdint>
+#include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "runner/display/display.h"
 #include "runner/display/mailbox.h"
+#include "runner/display/seen.h"
 #include "runner/display/window.h"
 #include "runner/display/window_layout.h"
 
@@ -18,12 +21,14 @@ namespace palpate::runner::display {
 
 struct Image {
   int width = 0, height = 0;
-  std::vector<std::uint32_t> pixels;  ///< 0xffRRGGBB, rows from the top
+  /// 0xffRRGGBB, rows from the top; over a scene with alpha, premultiplied.
+  std::vector<std::uint32_t> pixels;
 };
 
 struct PageOptions {
-  double ui_scale = 1;  ///< text is at least as large as a desktop's with this scale
-  int screen = 0;       ///< screen of a long text, from 0
+  double ui_scale = 1;      ///< text is at least as large as a desktop's with this scale
+  int screen = 0;           ///< screen of a long text, from 0
+  bool over_scene = false;  ///< what is behind it shows through, between words and keys
 };
 
 /// Deterministic. Invalid UTF-8 is shown as a replacement character. A long text to read continues
@@ -43,6 +48,8 @@ struct GLFWwindow;
 
 namespace palpate::runner::display {
 
+class SeenPainter;
+
 /// The participant's window. Created, drawn and given its keys by the display's thread.
 class ParticipantWindow final : public ParticipantScreen {
  public:
@@ -54,6 +61,9 @@ class ParticipantWindow final : public ParticipantScreen {
   ~ParticipantWindow() override;
 
   void show(const Page& page) override { pages_.put(page); }
+  void see(std::shared_ptr<const SeenTrial> trial) override;
+  void follow(const servo::Sample& sample) override;
+  std::vector<SeenFrame> frames() override { return frames_.take(); }
   std::vector<KeyPress> keys() override { return keys_.take(); }
   bool open() const override { return open_.load(); }
   bool settled() const override { return settled_.load(); }
@@ -84,6 +94,8 @@ class ParticipantWindow final : public ParticipantScreen {
 
  private:
   void paint(int width, int height);
+  void paint_seen(int width, int height, bool changed);
+  void begin_seeing(std::shared_ptr<const SeenTrial> trial);
   /// Turns to another screen of a long text. \return false: the key does not turn, or there is no
   /// such screen.
   bool turn_page(const std::string& key);
@@ -99,6 +111,12 @@ class ParticipantWindow final : public ParticipantScreen {
   Image image_;
   bool needs_redraw_ = true;  ///< the window does not show image_
   Mailbox<Page> pages_;
+  Mailbox<std::shared_ptr<const SeenTrial>> to_see_;
+  std::optional<SeenMoment> last_moment_;  ///< of the session's thread
+  SeenTrail trail_;
+  std::unique_ptr<SeenPainter> painter_;  ///< once anything is seen
+  std::optional<SeenScene> scene_;        ///< none: nothing is seen
+  EventQueue<SeenFrame> frames_;
   EventQueue<KeyPress> keys_;
   bool ignore_character_ = false;  ///< skip the next one: its key was handled already
   double wheel_ = 0;               ///< fraction of a notch, carried over

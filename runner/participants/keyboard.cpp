@@ -19,9 +19,12 @@
 #include <stdexcept>
 #include <utility>
 
+#include "data/base/random.h"
 #include "data/base/text.h"
 #include "protocols/answer_keys.h"
 #include "protocols/tasks/levels.h"
+#include "runner/display/seen.h"
+#include "runner/scene_builder.h"
 
 namespace palpate::runner::participants {
 namespace {
@@ -42,6 +45,31 @@ constexpr std::int64_t kBurst_ns = 400'000'000;  // keys of one number follow ea
 using NamedKeys = std::vector<std::pair<std::string, std::string>>;
 
 /// Home and target as the screen shows them.
+/// What is seen in an interval; null: nothing.
+std::shared_ptr<const display::SeenTrial> seen_trial_of(const protocols::Protocol& protocol,
+                                                        const protocols::Trial& trial,
+                                                        const protocols::Interval& interval) {
+  if (!protocol.view || interval.stimulus < 0) return nullptr;
+  const protocols::TaskBlock& block = protocols::block_of(protocol, trial);
+  const protocols::StimulusSpec shown =
+      interval.level ? protocols::at_level(protocol, block, interval.stimulus, *interval.level)
+                     : protocol.stimuli[static_cast<std::size_t>(interval.stimulus)];
+  if (!shown.seen || !shown.seen->anything() || !protocols::is_seen(block, interval))
+    return nullptr;
+  auto out = std::make_shared<display::SeenTrial>();
+  out->view = *protocol.view;
+  out->seen = *shown.seen;
+  out->object = shown.seen->shape ? *shown.seen->shape : shown.object;
+  out->object.pose = stimuli::compose({Vec3(0), trial.orientation}, out->object.pose);
+  out->tool = tool_of(protocol.tool);
+  out->workspace = workspace_of(protocol);
+  // Of each trial its own, and the same whenever it is shown.
+  out->seed = Random(protocol.seed, {static_cast<std::uint64_t>(trial.session),
+                                     static_cast<std::uint64_t>(trial.trial)})
+                  .next();
+  return out;
+}
+
 display::ReachPicture picture_of(const protocols::ReachingSpec& reaching,
                                  const protocols::Trial& trial) {
   const auto farthest = [&](int axis) {
@@ -185,6 +213,7 @@ void KeyboardRespondent::show(display::Page page) {
   page_ = std::move(page);
   reply_until_ns_ = 0;
   early_ = false;
+  if (page_.kind != display::Page::Kind::neutral) see({}, nullptr);
   screen_.show(page_);
 }
 
@@ -396,6 +425,7 @@ std::optional<Answer> KeyboardRespondent::step(const servo::Sample& sample) {
     onset_ns_ = sample.time_ns;
     early_ = false;
   }
+  if (sees_) screen_.follow(sample);
   show_cue(sample);
   show_way(sample);
   listen(sample);
@@ -423,8 +453,18 @@ std::optional<std::string> accepted_answer(const protocols::PageItem& item,
   return std::nullopt;
 }
 
+/// \param interval  null: nothing is felt or seen now
+void KeyboardRespondent::see(const protocols::Trial& trial, const protocols::Interval* interval) {
+  std::shared_ptr<const display::SeenTrial> seen;
+  if (interval != nullptr) seen = seen_trial_of(protocol_, trial, *interval);
+  if (seen == nullptr && !sees_) return;
+  sees_ = seen != nullptr;
+  screen_.see(std::move(seen));
+}
+
 void KeyboardRespondent::begin_interval(const protocols::Trial& trial, const IntervalView& view) {
   view_ = view;
+  see(trial, view.felt ? view.shown : nullptr);
   onset_ns_ = 0;
   buttons_ = 0xFF;
   pending_.reset();

@@ -77,6 +77,7 @@ class KeyboardRespondent final : public Respondent {
   enum class Cue { none, move_away, go_home, ready, go };
   display::Page between_trials(display::Page::Kind kind, const std::string& text) const;
   void show(display::Page page);
+  void see(const protocols::Trial& trial, const protocols::Interval* interval);
   void show_cue(const servo::Sample& sample);
   void show_way(const servo::Sample& sample);
   void reply();
@@ -127,6 +128,7 @@ class KeyboardRespondent final : public Respondent {
   std::optional<Answer> pending_;  ///< given; waits until the servo's samples reach its time
   const protocols::TaskBlock* block_ = nullptr;  ///< of the trial; may be null
   IntervalView view_;
+  bool sees_ = false;              ///< something of the interval is seen
   std::int64_t way_shown_ns_ = 0;  ///< of a movement's picture
   bool early_ = false;             ///< a trial or interval is prepared but cannot be answered yet
   std::optional<double> least_, most_;     ///< range of the number being typed
@@ -179,6 +181,11 @@ class ScreenWithBox final : public display::ParticipantScreen {
   ScreenWithBox(display::ParticipantScreen& screen, ResponseBox& box)
       : screen_(screen), box_(box) {}
   void show(const display::Page& page) override { screen_.show(page); }
+  void see(std::shared_ptr<const display::SeenTrial> trial) override {
+    screen_.see(std::move(trial));
+  }
+  void follow(const servo::Sample& sample) override { screen_.follow(sample); }
+  std::vector<display::SeenFrame> frames() override { return screen_.frames(); }
   std::vector<display::KeyPress> keys() override;
   bool open() const override { return screen_.open(); }
   bool settled() const override { return screen_.settled(); }

@@ -193,7 +193,7 @@ std::unique_ptr<display::DisplayLoop> open_display(const RunSettings& settings,
       if (!warning.empty()) std::fprintf(stderr, "%s\n", warning.c_str());
       return windows;
     } catch (const display::DisplayError& error) {
-      if (window.mouse != nullptr) throw;
+      if (window.mouse != nullptr || protocol.view) throw;
       std::fprintf(stderr, "%s; a text display instead\n", printable(error.what()).c_str());
     }
   }

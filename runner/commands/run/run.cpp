@@ -248,13 +248,17 @@ bool asks_for_consent(const protocols::Protocol& protocol) {
   });
 }
 
-/// \throws UsageError: this display cannot show what the protocol lets the participant see
-void require_sight(const protocols::Protocol& protocol) {
+/// \throws UsageError: a text display cannot show what the participant is to see
+void require_sight(const station::RunSettings& settings, const protocols::Protocol& protocol) {
+  if (!settings.no_window) return;
+  std::string seen;
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
     if (stimulus.seen && stimulus.seen->anything())
-      throw UsageError("stimulus '" + printable(stimulus.name) +
-                       "' is seen, and nothing is drawn for a participant yet: simulate runs it");
+      seen += (seen.empty() ? "'" : ", '") + printable(stimulus.name) + "'";
   }
+  if (!seen.empty())
+    throw UsageError("--no-window: the participant would not see " + seen +
+                     ", as the protocol has it");
 }
 
 bool has_joystick(const station::RunSettings& settings, const protocols::Protocol& protocol) {
@@ -301,7 +305,7 @@ int run_command(const std::vector<std::string>& args) {
       asks != nullptr && settings.advisor.empty())
     throw UsageError("block '" + asks->name +
                      "' asks a program for its levels: expected --ask SOCKET");
-  require_sight(admission.protocol);
+  require_sight(settings, admission.protocol);
   settings.participant = admission.participant;
   protocols::Protocol& protocol = admission.protocol;
   translate_texts(settings, admission);

@@ -3,9 +3,21 @@
 #include <glm/mat4x4.hpp>
 #include <glm/vec2.hpp>
 #include <glm/vec3.hpp>
+#include <optional>
 #include <span>
 
 namespace palpate::runner::display {
+
+/// A rectangle through which an eye sees the world, such as a screen. Virtual frame, m.
+struct PictureWindow {
+  glm::vec3 lower_left, lower_right, upper_left, eye;
+
+  glm::vec3 normal() const;  ///< unit, towards the eye
+  float distance() const;    ///< m, of the eye from the rectangle's plane
+  /// Virtual frame to clip space: a point lies where the line from the eye to it meets the
+  /// rectangle (Kooima, Generalized Perspective Projection, 2008).
+  glm::mat4 matrix() const;
+};
 
 /// The camera of a picture of a scene: z is up, and initially y points away from the camera (the
 /// frame of rendering/README.md). Points are in the virtual frame, m; pixels from the picture's
@@ -13,6 +25,8 @@ namespace palpate::runner::display {
 class Camera {
  public:
   void resize(float width, float height);
+  /// From now on the picture is what an eye sees through a window; orbit() to fit() change nothing.
+  void look_through(const PictureWindow& window) { window_ = window; }
   /// \param right, up  rad
   void orbit(float right, float up);
   /// Places the camera about the centre. \param yaw  rad, about +z, 0: on -y, looking along +y with
@@ -47,6 +61,7 @@ class Camera {
   float yaw_ = 0.5F, pitch_ = 0.4F;  ///< rad
   float distance_ = 0.62F;           ///< m
   glm::vec3 centre_{0, 0, 0};        ///< m
+  std::optional<PictureWindow> window_;
 };
 
 }  // namespace palpate::runner::display

@@ -88,7 +88,8 @@ struct ScenePicture {
   glm::vec3 middle{0};
   float size = 0.1F;
   float ground = 0;  ///< height of the ground, z
-  float grid = 0;    ///< between the lines on the ground; 0: none
+  bool with_ground = true;
+  float grid = 0;  ///< between the lines on the ground; 0: none
   /// Cutting plane: of objects, only the side with dot(plane, (x, y, z, 1)) > 0 is drawn.
   std::optional<glm::vec4> cut;
 };

@@ -36,7 +36,9 @@ DrawnMesh unit_square() {
 /// Direction to a lamp above the viewer's left shoulder, wherever the camera is.
 glm::vec3 lamp_of(const Camera& camera) {
   const glm::vec3 to_viewer = camera.towards_viewer();
-  const glm::vec3 level = glm::normalize(glm::vec3(to_viewer.x, to_viewer.y, 0));
+  glm::vec3 level(to_viewer.x, to_viewer.y, 0);
+  // From above: as if from the front.
+  level = glm::length(level) > 1e-3F ? glm::normalize(level) : glm::vec3(0, -1, 0);
   const glm::vec3 right(-level.y, level.x, 0);
   return glm::normalize(0.45F * level - 0.62F * right + glm::vec3(0, 0, 1));
 }
@@ -213,7 +215,7 @@ void SceneRenderer::draw_background(const Theme& theme) const {
 }
 
 void SceneRenderer::draw_ground(const ScenePicture& picture, const Camera& camera) const {
-  if (camera.eye().z <= picture.ground) return;  // it would hide everything
+  if (!picture.with_ground || camera.eye().z <= picture.ground) return;  // it would hide everything
   glEnable(GL_BLEND);
   glBlendFunc(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA);
   glDepthMask(GL_FALSE);  // objects below the ground stay visible
