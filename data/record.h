@@ -60,6 +60,15 @@ struct ReachRecord {
   std::optional<double> adaptation;         ///< clamp: slope of that force on the field's
 };
 
+/// When what was seen of a trial was on the screen, by the clock of the program: a screen and a
+/// compositor add to it. After the intended delay.
+struct SeenRecord {
+  int frames = 0;      ///< drawn
+  int dropped = 0;     ///< missing between them, by their median distance
+  double lag = 0;      ///< s, median from the tick whose pose is drawn to the swap
+  double lag_p99 = 0;  ///< s, likewise
+};
+
 /// What a trial asks. Onset, response time and contact of its record are those of the last interval
 /// felt.
 struct TaskRecord {
@@ -79,6 +88,7 @@ struct TaskRecord {
   std::optional<double> confidence;
   std::optional<std::int64_t> confidence_ns;  ///< session clock
   std::optional<ReachRecord> reach = std::nullopt;
+  std::optional<SeenRecord> seen;  ///< none: nothing was drawn
 
   bool of_block() const { return !block_name.empty(); }
 };

@@ -107,6 +107,7 @@ StoredProtocol read_stored_protocol(const std::string& text) {
     if (!name.empty()) out.stimuli.push_back(name);
   }
   for (const auto& page : list_of(json, "pages")) read_columns(page, out.columns);
+  out.has_view = json.contains("view");
   out.groups = read_groups(json);
   read_factors(json, out.factors);
   read_texts(json, "tests", out.tests);

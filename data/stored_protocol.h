@@ -40,6 +40,7 @@ struct StoredProtocol {
   std::vector<StoredColumn> columns;     ///< of participants
   GroupAssignment groups;                ///< of participants
   std::vector<StoredFactor> factors;     ///< empty: none
+  bool has_view = false;                 ///< something may be seen beside touch
   std::vector<std::string> tests;        ///< effects to adjust p values over; empty: all
 };
 

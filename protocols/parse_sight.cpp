@@ -125,10 +125,14 @@ void read_seen_keys(ObjectReader& section, const MeshFiles& files, SeenSpec& see
   section.vector("tool_offset_m", seen.tool_offset, kSeenShift);
   section.number("tool_gain", seen.tool_gain, kToolGain);
   section.choice("tool_place", seen.tool_stops, {{"ideal", true}, {"virtual", false}});
-  if (section.has("give_stiffness_n_per_m")) {
-    double give = 0;
-    section.number("give_stiffness_n_per_m", give, kGive);
-    seen.give_stiffness = give;
+  if (const json* const give = section.member("give_stiffness_n_per_m")) {
+    if (give->is_string()) {
+      section.choice("give_stiffness_n_per_m", seen.gives_as_felt, {{"felt", true}});
+    } else {
+      double stiffness = 0;
+      section.number("give_stiffness_n_per_m", stiffness, kGive);
+      seen.give_stiffness = stiffness;
+    }
   }
   section.number("delay_s", seen.delay, kSeenDelay);
   section.number("blur_deg", seen.blur_deg, kBlur);

@@ -42,6 +42,7 @@ struct SeenSpec {
   Vec3 tool_offset{0};                   ///< m
   double tool_gain = 1;                  ///< control/display ratio about the home centre
   bool tool_stops = true;                ///< the drawn tool stops at the surface
+  bool gives_as_felt = false;            ///< the drawn surface gives way by the felt depth
   std::optional<double> give_stiffness;  ///< N/m, of the drawn indentation; none: the felt depth
   double delay = 0;                      ///< s
   double blur_deg = 0;                   ///< sd, degrees of visual angle

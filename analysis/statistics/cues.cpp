@@ -15,6 +15,7 @@ constexpr double kQuartile = 0.6744897501960817;  // of the standard normal
 constexpr double kMostCueLapse = 0.06;
 constexpr double kLeastProbability = 1e-12;
 constexpr std::size_t kFewestLevels = 3;
+constexpr double kUsualSpread = 0.15;  // sd of a search's start, as a share of the levels' range
 
 double normal_cdf(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
 
@@ -129,7 +130,7 @@ SingleFit fit_single(const std::vector<LevelCount>& counts, double lapse, double
     return beyond * beyond - log_likelihood(counts, scale.centre + x[0] * scale.spread,
                                             scale.spread * std::exp(x[1]), lapse);
   };
-  const SimplexMinimum found = minimize(loss, {0, std::log(0.15)}, {0.1, 0.5}, tolerance);
+  const SimplexMinimum found = minimize(loss, {0, std::log(kUsualSpread)}, {0.1, 0.5}, tolerance);
   return {scale.centre + found.place[0] * scale.spread, scale.spread * std::exp(found.place[1])};
 }
 
@@ -156,15 +157,14 @@ double se_of_pse(const std::vector<LevelCount>& counts, double mu, double sd, do
 double fit_blocks(const std::vector<CueBlock>& blocks, double lapse, std::vector<CuePse>& points) {
   const LevelScaleOf scale = scale_of(blocks.front().counts);
   std::vector<double> start, steps;
-  double log_sd = 0;
   for (const CueBlock& block : blocks) {
     const SingleFit own = fit_single(block.counts, lapse, 1e-6);
     start.push_back((own.mu - scale.centre) / scale.spread);
     steps.push_back(0.05);
-    log_sd += std::log(own.sd / scale.spread) / static_cast<double>(blocks.size());
   }
-  start.push_back(log_sd);
-  steps.push_back(0.3);
+  // Not from the blocks' own: one that separates the levels perfectly is infinitely steep.
+  start.push_back(std::log(kUsualSpread));
+  steps.push_back(0.5);
   const auto loss = [&](const std::vector<double>& x) {
     const double beyond = std::max({0.0, -6 - x.back(), x.back() - 4});
     double sum = beyond * beyond;

@@ -47,12 +47,19 @@ bool have_reaches(Store& store) {
   });
 }
 
+bool have_views(Store& store) {
+  return std::ranges::any_of(store.protocols(), [](const ProtocolInfo& protocol) {
+    return read_stored_protocol(protocol.text).has_view;
+  });
+}
+
 }  // namespace
 
 ExportClock::ExportClock(Store& store, Times times)
     : times_(times),
       tasks_(have_blocks(store.protocols())),
       reaches_(have_reaches(store)),
+      seen_(have_views(store)),
       torque_(store),
       groups_(store),
       factors_(factors_of(store)) {

@@ -229,6 +229,19 @@ std::vector<Column> with_reaches(std::vector<Column> columns) {
   return columns;
 }
 
+std::vector<Column> with_sight(std::vector<Column> columns) {
+  const std::vector<Column> more = {
+      {"seen_lag_ms",
+       "From the tick whose pose was drawn to the swap of its frame, by the program's clock, "
+       "beyond the intended delay: median of the trial's frames; missing: nothing was drawn",
+       "ms"},
+      {"seen_lag_p99_ms", "The same: 99 % of the frames are not above", "ms"},
+      {"frames_dropped", "Frames missing between those drawn, by their median distance", "1"},
+  };
+  columns.insert(columns.end(), more.begin(), more.end());
+  return columns;
+}
+
 std::vector<Column> with_torque(std::vector<Column> columns) {
   columns.push_back(
       {"torque_driven",
@@ -383,25 +396,26 @@ std::vector<Column> with_factors(std::vector<Column> columns,
 /// \param cut_off  of attempts that were cut off
 std::span<const Column> columns_for(const ExportClock& clock, bool cut_off) {
   const bool torque = !cut_off && clock.torque().any(), tasks = !cut_off && clock.tasks();
-  const bool reaches = !cut_off && clock.reaches();
+  const bool reaches = !cut_off && clock.reaches(), seen = !cut_off && clock.seen();
   const bool groups = clock.groups().any(), relative = clock.relative();
   std::vector<std::pair<std::string, std::string>> levels;
   for (const StoredFactor& factor : clock.factors()) {
     levels.emplace_back(factor.name, "");
     levels.insert(levels.end(), factor.levels.begin(), factor.levels.end());
   }
-  static std::map<std::tuple<bool, bool, bool, bool, bool, bool, decltype(levels)>,
+  static std::map<std::tuple<bool, bool, bool, bool, bool, bool, bool, decltype(levels)>,
                   std::vector<Column>>
       tables;
   static std::mutex mutex;
   const std::lock_guard lock(mutex);
-  const auto [table, is_new] =
-      tables.try_emplace({cut_off, torque, tasks, reaches, groups, relative, std::move(levels)});
+  const auto [table, is_new] = tables.try_emplace(
+      {cut_off, torque, tasks, reaches, seen, groups, relative, std::move(levels)});
   std::vector<Column>& columns = table->second;
   if (!is_new) return columns;
   columns = cut_off ? make_attempts() : make_trials();
   if (tasks) columns = with_tasks(std::move(columns));
   if (reaches) columns = with_reaches(std::move(columns));
+  if (seen) columns = with_sight(std::move(columns));
   if (torque) columns = with_torque(std::move(columns));
   if (relative) columns = made_relative(std::move(columns));
   if (groups) columns = with_group(std::move(columns));

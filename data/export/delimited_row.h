@@ -156,6 +156,14 @@ void put_columns_of_trial(Row& row, const StoredTrial& trial, const ExportClock&
         << reach.largest_deviation << reach.path_ratio << reach.endpoint_error << reach.side_force
         << reach.adaptation;
   }
+  if (clock.seen()) {
+    const auto& seen = record.task.seen;
+    const auto milliseconds = [&](double SeenRecord::*value) {
+      return seen ? std::optional(1000 * (*seen).*value) : std::nullopt;
+    };
+    row << milliseconds(&SeenRecord::lag) << milliseconds(&SeenRecord::lag_p99)
+        << (seen ? std::optional(seen->dropped) : std::nullopt);
+  }
   if (clock.torque().any()) row << clock.torque().driven(trial);
   if (clock.relative()) row << clock.elapsed(trial);
 }

@@ -73,6 +73,11 @@ void validate_task(Validator& validator, const TaskRecord& task) {
       if (value) validator.finite("a measure of the reach", *value);
     }
   }
+  if (task.seen) {
+    validator.positive("frames", task.seen->frames);
+    for (const double value : {task.seen->lag, task.seen->lag_p99})
+      validator.finite("a lag of what was seen", value);
+  }
   for (const IntervalRecord& interval : task.intervals) {
     validator.text("stimulus", interval.stimulus);
     if (interval.level) validator.finite("level", *interval.level);

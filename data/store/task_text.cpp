@@ -78,6 +78,12 @@ std::optional<std::string> task_text(const TaskRecord& task) {
     for_each_measure(*task.reach,
                      [&](const char* key, const auto& value) { put_if(reach, key, value); });
   }
+  if (task.seen) {
+    out["seen"] = {{"frames", task.seen->frames},
+                   {"dropped", task.seen->dropped},
+                   {"lag_s", task.seen->lag},
+                   {"lag_p99_s", task.seen->lag_p99}};
+  }
   return out.dump();
 }
 
@@ -98,6 +104,11 @@ TaskRecord parse_task_text(const std::string& text) {
     take_if(in, "number", task.number);
     take_if(in, "confidence", task.confidence);
     take_if(in, "confidence_ns", task.confidence_ns);
+    if (in.contains("seen")) {
+      const Json& seen = in.at("seen");
+      task.seen = {seen.at("frames").get<int>(), seen.at("dropped").get<int>(),
+                   seen.at("lag_s").get<double>(), seen.at("lag_p99_s").get<double>()};
+    }
     if (!in.contains("reach")) return task;
     const Json& reach = in.at("reach");
     task.reach.emplace().kind = reach.at("kind").get<std::string>();

@@ -174,7 +174,7 @@ void KeyMap::draw(cairo_t* canvas, double middle, double top) const {
 }
 
 void draw_picture(cairo_t* canvas, const std::string& bytes, double middle, double top,
-                  double width, double room) {
+                  double width, double room, double most) {
   PngBytes source{bytes};
   const std::unique_ptr<cairo_surface_t, decltype(&cairo_surface_destroy)> picture(
       cairo_image_surface_create_from_png_stream(&read_png, &source), &cairo_surface_destroy);
@@ -184,7 +184,7 @@ void draw_picture(cairo_t* canvas, const std::string& bytes, double middle, doub
   }
   const double wide = cairo_image_surface_get_width(picture.get());
   const double high = cairo_image_surface_get_height(picture.get());
-  const double scale = std::min({width / wide, room / high, 2.0});
+  const double scale = std::min({width / wide, room / high, most});
   cairo_save(canvas);
   cairo_translate(canvas, middle - scale * wide / 2, top + (room - scale * high) / 2);
   cairo_scale(canvas, scale, scale);

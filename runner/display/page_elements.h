@@ -44,9 +44,10 @@ void draw_progress(cairo_t* canvas, const Page& page, double unit, double width)
 /// Draws the current step's instruction, then a line for each step.
 void draw_checklist(cairo_t* canvas, const Checklist& list, double unit, double width, double top,
                     double room);
-/// Draws a PNG file as large as fits, at most at twice its size; a note if it is not a PNG file.
+/// Draws a PNG file as large as fits, at most at `most` times its size; a note if it is not a PNG
+/// file.
 void draw_picture(cairo_t* canvas, const std::string& bytes, double middle, double top,
-                  double width, double room);
+                  double width, double room, double most = 2);
 /// Draws home as a ring, the target as a disc, where it is shown, and the tip as a dot.
 void draw_reach(cairo_t* canvas, const ReachPicture& reach, bool target, double middle, double top,
                 double room);

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
@@ -203,6 +204,9 @@ Image draw_page(const Page& page, int width, int height, const PageOptions& sett
     set_colour(owned.get(), kGround);
     cairo_paint(owned.get());
   }
+  if (const PictureBehind& behind = setting.picture; behind.bytes)
+    draw_picture(owned.get(), *behind.bytes, behind.left + behind.width / 2, behind.top,
+                 behind.width, behind.height, std::numeric_limits<double>::infinity());
   PageLayout(owned.get(), page, image.width, image.height, setting).draw(setting.screen);
   cairo_surface_flush(surface.get());
   if (setting.over_scene) return image;
@@ -363,6 +367,7 @@ void ParticipantWindow::draw() {
   if (image_.width != width || image_.height != height) {
     screens_ = screen_count(page_, width, height, ui_scale_);
     screen_ = std::min(screen_, screens_ - 1);
+    behind_ = {};
     image_ = draw_page(page_, width, height, {ui_scale_, screen_, scene_.has_value()});
     changed = needs_redraw_ = true;
   }
@@ -371,6 +376,22 @@ void ParticipantWindow::draw() {
   } else if (needs_redraw_) {
     paint(width, height);
   }
+}
+
+PictureBehind ParticipantWindow::picture_behind(const SeenPainter& painter, std::int64_t now,
+                                                int width, int height) const {
+  const SeenTrial& trial = scene_->trial();
+  const SeenScene::Place place = scene_->picture_place(now);
+  const SeenPainter::Part part = painter.screen_part(trial.view, width, height);
+  const double wide = double{part.right - part.left} * width,
+               high = double{part.above - part.below} * height;
+  PictureBehind out;
+  out.bytes = trial.seen.file_bytes;
+  out.width = 2 * place.half_width * wide;
+  out.height = 2 * place.half_height * high;
+  out.left = double{part.left} * width + place.x * wide - out.width / 2;
+  out.top = (1.0 - part.above) * height + place.y * high - out.height / 2;
+  return out;
 }
 
 /// Draws the pose of `delay_s` ago, as at the time of the frame.
@@ -382,6 +403,14 @@ void ParticipantWindow::paint_seen(int width, int height, bool changed) {
   const std::optional<SeenMoment> moment = trail_.at(now - delay);
   SeenPainter::Frame frame{&*scene_, nullptr, now, newest && newest->forces};
   if (moment && newest && is_visible(scene_->trial().seen, *newest)) frame.moment = &*moment;
+  PictureBehind behind;
+  if (frame.moment != nullptr && scene_->trial().seen.picture)
+    behind = picture_behind(*painter_, now, width, height);
+  if (behind != behind_) {
+    behind_ = behind;
+    image_ = draw_page(page_, width, height, {ui_scale_, screen_, true, behind_});
+    changed = true;
+  }
   painter_->paint(frame, image_, changed, width, height);
   glfwSwapBuffers(window_);
   glFinish();

@@ -25,10 +25,18 @@ struct Image {
   std::vector<std::uint32_t> pixels;
 };
 
+/// A picture file behind a page's words. px, of the rectangle in which it is as large as fits.
+struct PictureBehind {
+  std::shared_ptr<const std::string> bytes{};  ///< PNG; null: none
+  double left = 0, top = 0, width = 0, height = 0;
+  bool operator==(const PictureBehind&) const = default;
+};
+
 struct PageOptions {
   double ui_scale = 1;      ///< text is at least as large as a desktop's with this scale
   int screen = 0;           ///< screen of a long text, from 0
   bool over_scene = false;  ///< what is behind it shows through, between words and keys
+  PictureBehind picture{};
 };
 
 /// Deterministic. Invalid UTF-8 is shown as a replacement character. A long text to read continues
@@ -95,6 +103,8 @@ class ParticipantWindow final : public ParticipantScreen {
  private:
   void paint(int width, int height);
   void paint_seen(int width, int height, bool changed);
+  PictureBehind picture_behind(const SeenPainter& painter, std::int64_t now, int width,
+                               int height) const;
   void begin_seeing(std::shared_ptr<const SeenTrial> trial);
   /// Turns to another screen of a long text. \return false: the key does not turn, or there is no
   /// such screen.
@@ -116,6 +126,7 @@ class ParticipantWindow final : public ParticipantScreen {
   SeenTrail trail_;
   std::unique_ptr<SeenPainter> painter_;  ///< once anything is seen
   std::optional<SeenScene> scene_;        ///< none: nothing is seen
+  PictureBehind behind_;                  ///< as drawn last
   EventQueue<SeenFrame> frames_;
   EventQueue<KeyPress> keys_;
   bool ignore_character_ = false;  ///< skip the next one: its key was handled already

@@ -62,6 +62,16 @@ DrawnMesh refined(const DrawnMesh& mesh) {
   return out;
 }
 
+/// Whether the drawn surface gives way.
+bool gives(const protocols::SeenSpec& seen) { return seen.give_stiffness || seen.gives_as_felt; }
+
+/// m, by which it does.
+double give_of(const protocols::SeenSpec& seen, const SeenMoment& moment) {
+  if (!moment.touching) return 0;
+  if (seen.give_stiffness) return moment.pressing / *seen.give_stiffness;
+  return seen.gives_as_felt ? moment.depth : 0;
+}
+
 rendering::LineProbe shifted(const rendering::LineProbe& probe, const Vec3& by) {
   return {probe.tip + by, probe.tail + by};
 }
@@ -160,13 +170,12 @@ DrawnTool drawn_tool(const SeenTrial& trial, const SeenMoment& moment) {
   sample.probe = moment.hand;
   sample.rendering.ideal = moment.ideal;
   sample.rendering.contacts = moment.touching ? 1 : 0;
-  const bool stops = seen.tool_stops || (seen.give_stiffness && moment.touching);
+  const bool stops = seen.tool_stops || gives(seen);
   DrawnTool tool =
       stops && moment.touching ? ideal_tool(trial.tool, sample) : tool_in_hand(trial.tool, sample);
   Vec3 by = (seen.tool_gain - 1) * tool.stylus.tip + seen.tool_offset;
   // The drawn surface gives way, and the tool with it.
-  if (seen.give_stiffness && moment.touching)
-    by -= moment.pressing / *seen.give_stiffness * moment.normal;
+  by -= give_of(seen, moment) * moment.normal;
   tool.stylus = shifted(tool.stylus, by);
   for (rendering::LineProbe& segment : tool.segments) segment = shifted(segment, by);
   return tool;
@@ -180,6 +189,32 @@ Pose drawn_pose(const SeenTrial& trial, std::int64_t time_ns) {
           turn * trial.object.pose.orientation};
 }
 
+std::optional<data::SeenRecord> record_of(const std::vector<SeenFrame>& frames, double delay) {
+  if (frames.empty()) return std::nullopt;
+  constexpr double kPause = 0.25;  // s; longer: between intervals
+  std::vector<double> lags, steps;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    lags.push_back(static_cast<double>(frames[i].swap_ns - frames[i].pose_ns) / kSecond_ns - delay);
+    const double step =
+        i == 0 ? kPause
+               : static_cast<double>(frames[i].swap_ns - frames[i - 1].swap_ns) / kSecond_ns;
+    if (step < kPause) steps.push_back(step);
+  }
+  std::ranges::sort(lags);
+  std::ranges::sort(steps);
+  const auto quantile = [](const std::vector<double>& sorted, double share) {
+    return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1) + 0.5)];
+  };
+  data::SeenRecord out;
+  out.frames = static_cast<int>(frames.size());
+  out.lag = quantile(lags, 0.5);
+  out.lag_p99 = quantile(lags, 0.99);
+  if (steps.empty()) return out;
+  const double usual = quantile(steps, 0.5);
+  for (const double step : steps) out.dropped += static_cast<int>(std::lround(step / usual)) - 1;
+  return out;
+}
+
 float grey_of(double luminance) {
   const double x = std::clamp(luminance, 0.0, 1.0);
   return static_cast<float>(x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055);
@@ -189,7 +224,7 @@ SeenScene::SeenScene(std::shared_ptr<const SeenTrial> trial) : trial_(std::move(
   DrawnMesh mesh = triangles_of(trial_->object);
   if (const auto& texture = trial_->object.texture; texture && texture->depth > 0)
     mesh = with_texture(mesh, stimuli::Texture(*texture, trial_->object.radius));
-  if (trial_->seen.give_stiffness) mesh = refined(mesh);
+  if (gives(trial_->seen)) mesh = refined(mesh);
   for (const DrawnVertex& corner : mesh)
     size_ = std::max(size_, static_cast<double>(glm::length(corner.position)));
   mesh_ = std::make_shared<const DrawnMesh>(std::move(mesh));
@@ -198,7 +233,7 @@ SeenScene::SeenScene(std::shared_ptr<const SeenTrial> trial) : trial_(std::move(
 /// A bump (1 - r^2/R^2)^2 about the contact, inwards.
 std::shared_ptr<const DrawnMesh> SeenScene::dented(const SeenMoment& moment,
                                                    const Pose& pose) const {
-  const double deep = moment.pressing / *trial_->seen.give_stiffness;
+  const double deep = give_of(trial_->seen, moment);
   const Quat back = glm::conjugate(pose.orientation);
   const Vec3 centre = back * (moment.contact - pose.position) / trial_->seen.size_ratio;
   const double inwards = deep / trial_->seen.size_ratio;
@@ -227,8 +262,8 @@ ScenePicture SeenScene::picture(const SeenMoment& moment, std::int64_t time_ns) 
   out.middle = glm::vec3(pose.position);
   const auto light = grey_of(trial_->view.light);
   if (seen.object) {
-    const bool gives = seen.give_stiffness && moment.touching && moment.pressing > 0;
-    out.objects.push_back({gives ? dented(moment, pose) : mesh_, seen_place(pose, seen.size_ratio),
+    out.objects.push_back({give_of(seen, moment) > 0 ? dented(moment, pose) : mesh_,
+                           seen_place(pose, seen.size_ratio),
                            light * glm::vec3(0.75F, 0.72F, 0.66F), 1, 0, 0});
   }
   if (seen.tool) {

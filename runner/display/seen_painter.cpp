@@ -154,20 +154,22 @@ unsigned SeenPainter::blurred(const Frame& frame, unsigned scene, int width, int
   return blurs_[1];
 }
 
-SeenPainter::Layer SeenPainter::fitted(const protocols::ViewSpec& view, const Layer& at, int width,
-                                       int height) const {
+SeenPainter::Part SeenPainter::screen_part(const protocols::ViewSpec& view, int width, int height) {
   const double wanted = glm::length(view.lower_right - view.lower_left) /
                         glm::length(view.upper_left - view.lower_left);
-  const double narrow = std::min(1.0, wanted * height / width),
-               low = std::min(1.0, width / (wanted * height));
+  const auto narrow = static_cast<float>(std::min(1.0, wanted * height / width)),
+             low = static_cast<float>(std::min(1.0, width / (wanted * height)));
+  return {(1 - narrow) / 2, (1 - low) / 2, (1 + narrow) / 2, (1 + low) / 2};
+}
+
+SeenPainter::Layer SeenPainter::fitted(const protocols::ViewSpec& view, const Layer& at, int width,
+                                       int height) const {
+  const Part part = screen_part(view, width, height);
   Layer out = at;
-  const auto shrink = [](float& from, float& to, double share) {
-    const auto by = static_cast<float>((1 - share) / 2) * (to - from);
-    from += by;
-    to -= by;
-  };
-  shrink(out.left, out.right, narrow);
-  shrink(out.below, out.above, low);
+  out.left = at.left + part.left * (at.right - at.left);
+  out.right = at.left + part.right * (at.right - at.left);
+  out.below = at.below + part.below * (at.above - at.below);
+  out.above = at.below + part.above * (at.above - at.below);
   return out;
 }
 
@@ -234,6 +236,14 @@ void SeenPainter::paint(const Frame& frame, const Image& page, bool changed, int
   }
   const protocols::ViewSpec& view = frame.scene->trial().view;
   const double half = view.ipd / 2;
+  const auto part_of = [](float left, float below, float right, float above) {
+    Layer out;
+    out.left = left;
+    out.below = below;
+    out.right = right;
+    out.above = above;
+    return out;
+  };
   const float grey = grey_of(view.background);
   glBindFramebuffer(GL_FRAMEBUFFER, 0);
   glClearColor(grey, grey, grey, 1);
@@ -246,12 +256,12 @@ void SeenPainter::paint(const Frame& frame, const Image& page, bool changed, int
       draw_eye(frame, 0, {}, width, height);
       break;
     case protocols::Stereo::side_by_side:
-      draw_eye(frame, -half, {.right = 0.5F}, width, height);
-      draw_eye(frame, half, {.left = 0.5F}, width, height);
+      draw_eye(frame, -half, part_of(0, 0, 0.5F, 1), width, height);
+      draw_eye(frame, half, part_of(0.5F, 0, 1, 1), width, height);
       break;
     case protocols::Stereo::top_bottom:
-      draw_eye(frame, -half, {.below = 0.5F}, width, height);
-      draw_eye(frame, half, {.above = 0.5F}, width, height);
+      draw_eye(frame, -half, part_of(0, 0.5F, 1, 1), width, height);
+      draw_eye(frame, half, part_of(0, 0, 1, 0.5F), width, height);
       break;
     case protocols::Stereo::anaglyph:
       layer_.use();

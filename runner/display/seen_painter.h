@@ -31,11 +31,16 @@ class SeenPainter {
   /// \param changed  the page is another than that of the last call \throws DisplayError
   void paint(const Frame& frame, const Image& page, bool changed, int width, int height);
 
- private:
-  /// Draws a texture to a rectangle in shares of the window, y up.
-  struct Layer {
-    unsigned texture = 0;
+  /// A rectangle in shares of the window, y up.
+  struct Part {
     float left = 0, below = 0, right = 1, above = 1;
+  };
+  /// The part of the window that has the sides of the protocol's screen: the whole, if it is there.
+  static Part screen_part(const protocols::ViewSpec& view, int width, int height);
+
+ private:
+  struct Layer : Part {
+    unsigned texture = 0;
     bool top_first = false;  ///< rows of the texture are from the top
   };
   /// \param at  of the window, which this eye sees

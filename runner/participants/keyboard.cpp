@@ -326,6 +326,7 @@ void KeyboardRespondent::feedback(bool correct) {
 }
 
 void KeyboardRespondent::begin_trial(const protocols::Trial& trial) {
+  screen_.frames();  // of a trial that was cut off
   const protocols::TaskBlock& block = protocols::block_of(protocol_, trial);
   block_ = block.order == protocols::BlockOrder::shapes ? nullptr : &block;
   display::Page page;
@@ -459,7 +460,12 @@ void KeyboardRespondent::see(const protocols::Trial& trial, const protocols::Int
   if (interval != nullptr) seen = seen_trial_of(protocol_, trial, *interval);
   if (seen == nullptr && !sees_) return;
   sees_ = seen != nullptr;
+  if (sees_) delay_ = seen->seen.delay;
   screen_.see(std::move(seen));
+}
+
+std::optional<data::SeenRecord> KeyboardRespondent::seen() {
+  return display::record_of(screen_.frames(), std::exchange(delay_, 0));
 }
 
 void KeyboardRespondent::begin_interval(const protocols::Trial& trial, const IntervalView& view) {

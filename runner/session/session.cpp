@@ -618,6 +618,7 @@ bool Session::run_trial() {
   record_.max_force = quality_.max_force;
   record_.contact_share = contact_.contact_share();
   record_.edge_dwell = contact_.edge_dwell(1 / station_.protocol.servo_rate);
+  record_.task.seen = participant_.seen();
   if (events_ != nullptr) events_->answered(record_);
   return true;
 }

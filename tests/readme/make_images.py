@@ -182,6 +182,14 @@ def study_figure(protocol, name):
     return make
 
 
+def cues_pse(palpate, folder):
+    """Points of equality of the study of seen and felt sizes in protocols/README.md."""
+    database = folder / "size.db"
+    subprocess.run([palpate, "simulate", PROTOCOLS / "visual-haptic-size.json", "--db", database, "--participants", "12", "--seed", "1"], check=True)
+    subprocess.run([palpate, "analyze", "--db", database, "--cues", "--figures", folder / "cues"], stdout=subprocess.DEVNULL, check=True)
+    shutil.copyfile(folder / "cues" / "cues-pse.svg", IMAGES / "cues-pse.svg")
+
+
 def sweep_gains(palpate, folder):
     """The sweep of runner/participants/README.md, which takes half an hour."""
     database = folder / "participants.sweep"
@@ -242,7 +250,7 @@ STUDIES = {"force-field": "reach2", "grating-roughness": "magnitude1", "spacing-
 PICTURES = {**{name: scene(name) for name in SCENES}, **{name: study_figure(name, figure) for name, figure in STUDIES.items()},
             "contact-patches": lambda palpate, folder: (IMAGES / "contact-patches.svg").write_text(contact_patches()),
             "explore-window": explore_window, "live-session": lambda *arguments: undisturbed(live_session, *arguments), "figure15": figure("figure15"),
-            "speedup": figure("speedup"), "power": power, "group": group, "sweep-gains": sweep_gains, "soft-stability": soft_stability,
+            "speedup": figure("speedup"), "power": power, "group": group, "cues-pse": cues_pse, "sweep-gains": sweep_gains, "soft-stability": soft_stability,
             "recover-parameters": example("recover_parameters"), "choose-sizes": example("choose_sizes")}
 
 
