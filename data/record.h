@@ -67,6 +67,9 @@ struct SeenRecord {
   int dropped = 0;     ///< missing between them, by their median distance
   double lag = 0;      ///< s, median from the tick whose pose is drawn to the swap
   double lag_p99 = 0;  ///< s, likewise
+
+  /// s; half of what people notice between sight and touch (45 ms, Vogels 2004).
+  static constexpr double kMostLag = 0.0225;
 };
 
 /// What a trial asks. Onset, response time and contact of its record are those of the last interval

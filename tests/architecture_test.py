@@ -113,7 +113,7 @@ PUBLIC = {
     "runner/evidence/scenes": "feature_costs scene_study",
     "runner/evidence/accuracy": "body_study methods paper_first_contact peers study union_study",
     "rendering/bodies/soft": "soft_scene",
-    "protocols": "answer_keys difference factors groups json_document parse protocol schedule session_plan sweep_space "
+    "protocols": "answer_keys difference factors groups json_document parse protocol schedule session_plan sight sweep_space "
                  "tasks/block_order tasks/block_procedures tasks/levels tasks/texts",
     "protocols/procedures": "procedure procedure_spec psychometric",
     "data/base": "cell_name checksum column_names group_assignment input_file json_text markdown random text",
@@ -125,12 +125,12 @@ PUBLIC = {
     "data/merge": "merge",
     "analysis": "text",
     "analysis/input": "csv_reader trials study_record study_table sweep_table",
-    "analysis/statistics": "analysis comparison conclusions describe group_power group_simulation interval_coverage jobs mixed_model "
+    "analysis/statistics": "analysis comparison conclusions cue_plan cue_study cues describe group_power group_simulation interval_coverage jobs mixed_model "
                            "paired paired_evidence pattern power plan quantiles sensitivity "
                            "study_design sweep_analysis task_analysis threshold_plan",
     "analysis/movement": "comparison measures pictures",
     "analysis/figures": "panel_drawing figures svg",
-    "analysis/report": "coverage_report html_page hypotheses plan_record plan_report report study_report tables",
+    "analysis/report": "coverage_report cue_report html_page hypotheses plan_record plan_report report study_report tables",
     "runner": "",
     "runner/servo": "device force_limiter passivity realtime ring sample servo servo_thread "
                     "shared_value tick_source touched_places triple_buffer",
@@ -138,8 +138,8 @@ PUBLIC = {
     "runner/sound": "masking_noise",
     "runner/devices": "device_delay mouse registry self_test simulated",
     "runner/devices/falcon": "calibration falcon stylus_from_ends",
-    "runner/display": "display explore_window mailbox text_display timeline window",
-    "runner/display/scene": "camera picture drawn_mesh image_file painter scene_drawing "
+    "runner/display": "display explore_window mailbox seen text_display timeline window",
+    "runner/display/scene": "camera gl_objects picture drawn_mesh image_file painter scene_drawing "
                             "scene_renderer",
     "runner/participants": "keyboard reacher respondent simulated_settings simulated "
                            "task_participant",
@@ -152,7 +152,7 @@ PUBLIC = {
     "runner/movement": "movement_study touched_trial",
     "runner/evidence/reports": "accuracy_report boundary_report scene_report stability_report stability_study",
     "runner/registration": "about_file answers bundle_contents deviations planned_conditions planned_studies registration registration_text sealed_folder",
-    "runner/study": "export_settings simulation_limits study_order study_trials task_words",
+    "runner/study": "cue_study export_settings simulation_limits study_order study_trials task_words",
     "runner/serve": "network served_scene served_session",
     "runner/sweep": "cluster_folder cluster_job slurm swept_study",
     "runner/evidence/stability": "boundary effect_stability scene_boundary",

@@ -90,8 +90,9 @@ constexpr const char* kHowTo =
 
 constexpr const char* kJndNote =
     "JND: half the distance of the levels of 25 and 75 %. Better cue: the smaller of the two JNDs "
-    "of a participant, without the bias of taking the smaller of two estimates (parametric "
-    "bootstrap). One lapse rate for all blocks of a participant.";
+    "of a participant, less the bias that a parametric bootstrap finds in taking the smaller of "
+    "two "
+    "estimates, about half of it. One lapse rate for all blocks of a participant.";
 
 Table participants_table(const CueAnalysis& analysis) {
   Table table;

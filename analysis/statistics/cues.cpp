@@ -195,20 +195,23 @@ std::vector<LevelCount> resampled(const std::vector<LevelCount>& counts, const S
   return out;
 }
 
-/// The smaller of two standard deviations less the bias of its logarithm in a parametric bootstrap.
+/// The smaller of two standard deviations, less the bias of its logarithm in a parametric bootstrap
+/// (of the median).
 double better_sd(const CueAnswers& answers, const SingleFit& haptic, const SingleFit& visual,
                  double lapse, const CueSettings& settings, std::uint64_t stream) {
   const double least = std::min(haptic.sd, visual.sd);
   if (settings.resamples <= 0) return least;
   Random random(settings.seed, {stream});
-  constexpr double kRough = 1e-4;
-  double sum = 0;
+  constexpr double kRough = 1e-7;
+  std::vector<double> logs;
+  logs.reserve(static_cast<std::size_t>(settings.resamples));
   for (int i = 0; i < settings.resamples; ++i) {
     const double h = fit_single(resampled(answers.haptic, haptic, lapse, random), lapse, kRough).sd;
     const double v = fit_single(resampled(answers.visual, visual, lapse, random), lapse, kRough).sd;
-    sum += std::log(std::min(h, v));
+    logs.push_back(std::log(std::min(h, v)));
   }
-  const double bias = sum / settings.resamples - std::log(least);
+  // The median: a resample that separates the levels perfectly is infinitely steep.
+  const double bias = median(logs) - std::log(least);
   return least * std::exp(-bias);
 }
 

@@ -71,7 +71,9 @@ struct CueParticipant {
   double weight_visual = 0;     ///< 1/2 + slope of the points of equality over the conflict
   double weight_predicted = 0;  ///< s_h^2 / (s_v^2 + s_h^2)
   double jnd_haptic = 0, jnd_visual = 0, jnd_both = 0, jnd_predicted = 0;
-  /// The smaller of the two JNDs, without the bias of taking the smaller of two estimates.
+  /// The smaller of the two JNDs, less the bias that a parametric bootstrap finds in taking the
+  /// smaller of two estimates: about half of it, since it begins at estimates that differ by
+  /// chance.
   double jnd_better = 0;
   std::vector<CuePse> points;
   std::array<CueModelFit, kCueModels> models;

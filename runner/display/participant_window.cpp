@@ -232,7 +232,9 @@ std::uint32_t ground_colour() {
 
 ParticipantWindow::ParticipantWindow(const WindowSettings& settings, const WindowGeometry& geometry,
                                      double ui_scale)
-    : settings_(settings), window_(make_window(settings.title, geometry)), ui_scale_(ui_scale) {
+    : settings_(settings),
+      window_(make_window(settings.title, geometry, settings.quad_buffer)),
+      ui_scale_(ui_scale) {
   glfwSetInputMode(window_, GLFW_CURSOR, GLFW_CURSOR_HIDDEN);
   glGenTextures(1, &texture_);
   glBindTexture(GL_TEXTURE_2D, texture_);

@@ -189,32 +189,6 @@ Pose drawn_pose(const SeenTrial& trial, std::int64_t time_ns) {
           turn * trial.object.pose.orientation};
 }
 
-std::optional<data::SeenRecord> record_of(const std::vector<SeenFrame>& frames, double delay) {
-  if (frames.empty()) return std::nullopt;
-  constexpr double kPause = 0.25;  // s; longer: between intervals
-  std::vector<double> lags, steps;
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    lags.push_back(static_cast<double>(frames[i].swap_ns - frames[i].pose_ns) / kSecond_ns - delay);
-    const double step =
-        i == 0 ? kPause
-               : static_cast<double>(frames[i].swap_ns - frames[i - 1].swap_ns) / kSecond_ns;
-    if (step < kPause) steps.push_back(step);
-  }
-  std::ranges::sort(lags);
-  std::ranges::sort(steps);
-  const auto quantile = [](const std::vector<double>& sorted, double share) {
-    return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1) + 0.5)];
-  };
-  data::SeenRecord out;
-  out.frames = static_cast<int>(frames.size());
-  out.lag = quantile(lags, 0.5);
-  out.lag_p99 = quantile(lags, 0.99);
-  if (steps.empty()) return out;
-  const double usual = quantile(steps, 0.5);
-  for (const double step : steps) out.dropped += static_cast<int>(std::lround(step / usual)) - 1;
-  return out;
-}
-
 float grey_of(double luminance) {
   const double x = std::clamp(luminance, 0.0, 1.0);
   return static_cast<float>(x <= 0.0031308 ? 12.92 * x : 1.055 * std::pow(x, 1 / 2.4) - 0.055);

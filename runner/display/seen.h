@@ -10,7 +10,6 @@
 #include <optional>
 #include <vector>
 
-#include "data/record.h"
 #include "protocols/sight.h"
 #include "rendering/tool.h"
 #include "runner/display/display.h"
@@ -98,10 +97,6 @@ class SeenScene {
   std::shared_ptr<const DrawnMesh> mesh_;
   double size_ = 0.05;  ///< m, radius about the object's origin
 };
-
-/// Figures of a trial's frames; none: there were none.
-/// \param delay  s, intended
-std::optional<data::SeenRecord> record_of(const std::vector<SeenFrame>& frames, double delay);
 
 /// Luminance, 0 to 1, linear, as a grey of sRGB.
 float grey_of(double luminance);

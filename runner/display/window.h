@@ -21,6 +21,7 @@ struct WindowSettings {
   double ui_scale = 0;          ///< scale of text and buttons; 0: taken from each window's monitor
   int participant_monitor = 0;  ///< from 1; 0: the second if there is one, else the first
   int console_monitor = 0;      ///< from 1; 0: the first
+  bool quad_buffer = false;     ///< the participant's window has a buffer for each eye
   std::vector<std::string> texts;  ///< UTF-8, of the protocol: the console loads fonts for them
   /// Called at once, in the display's thread, when the emergency key or button is pressed; the
   /// command follows through commands().

@@ -317,8 +317,9 @@ WindowLayout lay_out_windows(const WindowSettings& settings) {
   return layout;
 }
 
-GLFWwindow* make_window(const std::string& title, const WindowGeometry& geometry) {
+GLFWwindow* make_window(const std::string& title, const WindowGeometry& geometry, bool stereo) {
   glfwDefaultWindowHints();
+  glfwWindowHint(GLFW_STEREO, stereo ? GLFW_TRUE : GLFW_FALSE);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MAJOR, 3);
   glfwWindowHint(GLFW_CONTEXT_VERSION_MINOR, 3);
   glfwWindowHint(GLFW_OPENGL_PROFILE, GLFW_OPENGL_CORE_PROFILE);
@@ -329,7 +330,10 @@ GLFWwindow* make_window(const std::string& title, const WindowGeometry& geometry
   const ScreenBox& box = geometry.box;
   GLFWwindow* const window =
       glfwCreateWindow(box.width, box.height, title.c_str(), nullptr, nullptr);
-  if (window == nullptr) throw DisplayError("no window with OpenGL 3.3: " + glfw_reason());
+  if (window == nullptr)
+    throw DisplayError((stereo ? "no window with a buffer for each eye (stereo: quad_buffer): "
+                               : "no window with OpenGL 3.3: ") +
+                       glfw_reason());
   if (geometry.least_width > 0)
     glfwSetWindowSizeLimits(window, geometry.least_width, geometry.least_height, GLFW_DONT_CARE,
                             GLFW_DONT_CARE);

@@ -43,7 +43,8 @@ double single_scale(double wanted);
 void bring_into_sight(GLFWwindow* window);
 
 /// A hidden window with an OpenGL 3.3 context, made current. \throws DisplayError
-GLFWwindow* make_window(const std::string& title, const WindowGeometry& geometry);
+GLFWwindow* make_window(const std::string& title, const WindowGeometry& geometry,
+                        bool stereo = false);
 
 /// GLFW's description of its latest error.
 std::string glfw_reason();

@@ -24,6 +24,7 @@
 #include "protocols/answer_keys.h"
 #include "protocols/tasks/levels.h"
 #include "runner/display/seen.h"
+#include "runner/participants/seen_record.h"
 #include "runner/scene_builder.h"
 
 namespace palpate::runner::participants {
@@ -465,7 +466,7 @@ void KeyboardRespondent::see(const protocols::Trial& trial, const protocols::Int
 }
 
 std::optional<data::SeenRecord> KeyboardRespondent::seen() {
-  return display::record_of(screen_.frames(), std::exchange(delay_, 0));
+  return seen_record(screen_.frames(), std::exchange(delay_, 0));
 }
 
 void KeyboardRespondent::begin_interval(const protocols::Trial& trial, const IntervalView& view) {

@@ -273,6 +273,9 @@ void SessionMonitor::recorded(const data::TrialRecord& record) {
     say("trial " + std::to_string(record.trial) + " missed " + std::to_string(record.missed_ticks) +
         (record.missed_ticks == 1 ? " tick, up to " : " ticks, up to ") +
         milliseconds(record.longest_period_ns) + " apart (recorded): the computer was busy");
+  if (const auto& seen = record.task.seen; seen && seen->lag > data::SeenRecord::kMostLag)
+    say("what is seen was " + milliseconds(std::llround(seen->lag * kSecond_ns)) +
+        " late in trial " + std::to_string(record.trial) + ": people may notice 45 ms");
   if (!record.response.empty() && !touched_ && !record.task.catch_trial) {
     say("trial " + std::to_string(record.trial) + " was answered before the first contact");
   }

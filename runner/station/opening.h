@@ -57,6 +57,11 @@ void print_dropped(const session::Markers& markers, const session::SampleStream*
 std::unique_ptr<sound::NoisePlayer> open_noise(const RunSettings& settings,
                                                const protocols::Protocol& protocol);
 
+/// What the newest run of a protocol with a view says of the lag of its frames.
+/// \return a note for the record: the lag is accepted; empty: it is short, or unknown
+/// \throws UsageError: people may notice it, and the protocol does not accept that
+std::string check_seen_lag(data::Store& store, const protocols::Protocol& protocol);
+
 /// Null if no response box is named. \param emergency  commands zero force at once; called in the
 /// box's thread. \throws UsageError; std::runtime_error: its port cannot be opened
 std::unique_ptr<participants::ResponseBox> open_response_box(

@@ -327,6 +327,8 @@ int run_command(const std::vector<std::string>& args) {
   // The record. Data from a simulated device is labelled simulated, whoever answers.
   data::Store store = data::Store::open(settings.database, data::Store::Mode::write_or_create);
   warn_of_exposure(store.path());
+  if (std::string note = station::check_seen_lag(store, protocol); !note.empty())
+    admission.notes.push_back(std::move(note));
   servo::RealClock clock;
   const data::Participant participant =
       store.look_up(admission.enrolled, settings.participant, admission.number, device.simulated);
