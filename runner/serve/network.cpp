@@ -1,6 +1,5 @@
 #include "runner/serve/network.h"
 
-#include <sys/random.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
@@ -23,10 +22,10 @@
 #include <map>
 #include <mutex>
 #include <stdexcept>
-#include <string_view>
 #include <thread>
 #include <utility>
 
+#include "runner/serve/loopback.h"
 #include "runner/servo/realtime.h"
 
 namespace palpate::runner::serve {
@@ -58,16 +57,6 @@ constexpr const char* kSubprotocol = "palpate.1";
 std::int64_t now_ns() {
   servo::RealClock clock;
   return clock.now_ns();
-}
-
-/// Compares in constant time, so that timing does not reveal the token.
-bool equal_in_constant_time(const std::string& said, const std::string& token) {
-  std::size_t difference = said.size() ^ token.size();
-  for (std::size_t i = 0; i < token.size(); ++i) {
-    const char other = i < said.size() ? said[i] : '\0';
-    difference |= static_cast<unsigned char>(token[i] ^ other);
-  }
-  return difference == 0;
 }
 
 void add_number(std::string& out, double value) {
@@ -312,12 +301,6 @@ class LineClient final : public Client {
   std::string text_, line_;
 };
 
-bool is_loopback_name(std::string host) {
-  const std::size_t colon = host.rfind(':');
-  if (colon != std::string::npos) host.resize(colon);
-  return host == "127.0.0.1" || host == "localhost";
-}
-
 bool offers_subprotocol(const http::request<http::empty_body>& request) {
   for (const auto& field : request) {
     if (field.name() != http::field::sec_websocket_protocol) continue;
@@ -337,7 +320,7 @@ class Network::Impl final : public Hub {
         local_acceptor_(io_),
         watch_timer_(io_),
         stream_timer_(io_) {
-    listen();
+    listen_on_loopback(acceptor_, settings_.port);
     if (!settings_.socket.empty()) listen_local();
   }
   ~Impl() override {
@@ -443,19 +426,6 @@ class Network::Impl final : public Hub {
   }
 
  private:
-  void listen() {
-    try {
-      const tcp::endpoint place(asio::ip::address_v4::loopback(), settings_.port);
-      acceptor_.open(place.protocol());
-      acceptor_.set_option(tcp::acceptor::reuse_address(true));
-      acceptor_.bind(place);
-      acceptor_.listen();
-    } catch (const boost::system::system_error& error) {
-      throw std::runtime_error("port " + std::to_string(settings_.port) +
-                               " of 127.0.0.1: " + error.code().message() +
-                               "; another server may run: --port 0 takes a free one");
-    }
-  }
   void listen_local() {
     try {
       const Local::endpoint place(settings_.socket);
@@ -570,21 +540,11 @@ class Network::Impl final : public Hub {
   }
   /// The page does not contain the token: its user needs the whole address.
   void show_page(const std::shared_ptr<Greeting>& greeting) {
-    const std::string nonce = make_token(), port = std::to_string(this->port());
-    std::string page = settings_.page;
-    constexpr std::string_view kMark = "@NONCE@";
-    for (std::size_t at = 0; (at = page.find(kMark, at)) != std::string::npos;)
-      page.replace(at, kMark.size(), nonce);
-    auto& response = greeting->response;
-    response.set("Content-Security-Policy",
-                 "default-src 'none'; script-src 'nonce-" + nonce + "'; style-src 'nonce-" + nonce +
-                     "'; img-src data:; connect-src ws://127.0.0.1:" + port + " ws://localhost:" +
-                     port + "; base-uri 'none'; form-action 'none'; frame-ancestors 'none'");
-    response.set(http::field::cache_control, "no-store");
-    response.set("Referrer-Policy", "no-referrer");
-    response.set("Cross-Origin-Opener-Policy", "same-origin");
-    response.set("Cross-Origin-Resource-Policy", "same-origin");
-    respond(greeting, http::status::ok, std::move(page), "text/html; charset=utf-8");
+    const std::string port = std::to_string(this->port());
+    GuardedPage page =
+        guarded_page(settings_.page, "ws://127.0.0.1:" + port + " ws://localhost:" + port);
+    for (const auto& [name, value] : page.headers) greeting->response.set(name, value);
+    respond(greeting, http::status::ok, std::move(page.html), "text/html; charset=utf-8");
   }
   void respond(const std::shared_ptr<Greeting>& greeting, http::status status, std::string body,
                const char* type = "text/plain; charset=utf-8") {
@@ -776,19 +736,6 @@ class Network::Impl final : public Hub {
   std::vector<ServeCommand> commands_;
   std::thread thread_;
 };
-
-std::string make_token() {
-  unsigned char bytes[16];
-  if (::getrandom(bytes, sizeof bytes, 0) != sizeof bytes)
-    throw std::runtime_error("the kernel gives no random numbers for a token");
-  std::string out;
-  for (const unsigned char byte : bytes) {
-    constexpr const char* kDigits = "0123456789abcdef";
-    out += kDigits[byte >> 4];
-    out += kDigits[byte & 15];
-  }
-  return out;
-}
 
 bool is_listening(std::uint16_t port) {
   asio::io_context io;

@@ -38,9 +38,6 @@ struct NetworkHooks {
   std::function<void()> wake;  ///< the session's thread: there is a command
 };
 
-/// 128 bits as 32 hexadecimal digits, from the kernel. \throws std::runtime_error
-std::string make_token();
-
 /// Whether a program listens at this port of 127.0.0.1.
 bool is_listening(std::uint16_t port);
 

@@ -16,6 +16,7 @@
 #include "runner/commands/run/settings.h"
 #include "runner/commands/shared/command.h"
 #include "runner/safety/fault_signals.h"
+#include "runner/serve/loopback.h"
 #include "runner/serve/network.h"
 #include "runner/serve/served_scene.h"
 #include "runner/serve/served_session.h"
