@@ -148,7 +148,7 @@ PUBLIC = {
                       "socket_advisor station",
     "runner/output": "outputs progress_line",
     "runner/station": "admission opening protocol_check protocol_choice run_settings",
-    "runner/touch": "forces live_touch scene_notes trial_page",
+    "runner/touch": "checked_meshes forces live_touch scene_notes trial_page",
     "runner/movement": "movement_study touched_trial",
     "runner/evidence/reports": "accuracy_report boundary_report scene_report stability_report stability_study",
     "runner/registration": "about_file answers bundle_contents deviations planned_conditions planned_studies registration registration_text sealed_folder",

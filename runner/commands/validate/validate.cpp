@@ -24,6 +24,7 @@
 #include "runner/session/simulated_study.h"
 #include "runner/station/protocol_check.h"
 #include "runner/study/task_words.h"
+#include "runner/touch/checked_meshes.h"
 #include "runner/touch/forces.h"
 #include "runner/touch/scene_notes.h"
 #include "stimuli/closed_surface.h"
@@ -31,37 +32,9 @@
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
-#include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::runner::commands {
 namespace {
-
-/// Builds every mesh of an object, as a session does, and adds its faults.
-void check_meshes(const stimuli::ObjectSpec& object, const std::string& pointer,
-                  const std::string& file, SceneBuilder& builder,
-                  std::vector<protocols::Fault>& faults) {
-  if (object.shape == stimuli::ShapeKind::compound) {
-    for (std::size_t i = 0; i < object.parts.size(); ++i) {
-      check_meshes(object.parts[i], pointer + "/parts/" + std::to_string(i), file, builder, faults);
-    }
-    return;
-  }
-  if (object.shape == stimuli::ShapeKind::none) return;
-  const std::string where = object.shape == stimuli::ShapeKind::mesh ? pointer + "/file" : pointer;
-  try {
-    if (stimuli::is_gmsh_file_name(object.file)) {
-      stimuli::solid_of_file(object);
-    } else if (object.shape == stimuli::ShapeKind::mesh) {
-      builder.mesh(object);
-    } else {
-      stimuli::convex_parts(object);
-    }
-  } catch (const stimuli::MeshError& error) {
-    for (const std::string& fault : error.faults()) faults.push_back({file, where, fault});
-  } catch (const std::runtime_error& error) {
-    faults.push_back({file, where, error.what()});
-  }
-}
 
 /// Prints overlapping groups of a mesh file: accepted, but probably unintended if parts should
 /// abut.
@@ -286,7 +259,7 @@ void validate_scene(const std::string& text, const std::string& path, bool json,
   std::vector<protocols::Fault> faults;
   SceneBuilder builder;
   for (std::size_t i = 0; i < spec.objects.size(); ++i)
-    check_meshes(spec.objects[i], "/objects/" + std::to_string(i), path, builder, faults);
+    touch::check_meshes(spec.objects[i], "/objects/" + std::to_string(i), path, builder, faults);
   if (!faults.empty()) throw protocols::InputError(faults);
   touch::build_scene(builder, path, spec, touch::renderer_named("point"));
   const rendering::Scene scene =
@@ -317,16 +290,6 @@ std::vector<devices::ChainTiming> measured_chains(const std::string& calibration
   return measured;
 }
 
-/// What a protocol's stimuli need to be told of, a sentence each.
-std::vector<std::string> notes_on(const protocols::Protocol& protocol, SceneBuilder& builder) {
-  std::vector<std::string> out;
-  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
-    for (const std::string& note : touch::mesh_notes(stimulus.object, builder))
-      out.push_back("stimulus " + stimulus.name + ": " + note);
-  }
-  return out;
-}
-
 void print_protocol(const protocols::Protocol& protocol, SceneBuilder builder,
                     const std::vector<devices::ChainTiming>& measured, std::ostream& out) {
   print_summary(protocol, out);
@@ -334,7 +297,7 @@ void print_protocol(const protocols::Protocol& protocol, SceneBuilder builder,
   if (!built_in.empty())
     out << "  texts       built in, in English; a protocol in another language gives its own: "
         << list(built_in) << "\n";
-  for (const std::string& note : notes_on(protocol, builder))
+  for (const std::string& note : touch::stimulus_notes(protocol, builder))
     out << "  mesh        " << note << "\n";
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
     print_overlaps(stimulus.object, "stimulus " + stimulus.name, builder, out);
@@ -378,23 +341,11 @@ void validate_file(const ValidateRequest& request, std::ostream& out) {
     out << protocols::texts_json(protocol);
     return;
   }
-  std::vector<protocols::Fault> faults;
   SceneBuilder builder;
-  for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
-    check_meshes(protocol.stimuli[i].object,
-                 "/stimuli/" + std::to_string(protocol.stimuli[i].place), file, builder, faults);
-  }
-  for (std::size_t g = 0; g < protocol.group_protocols.size(); ++g) {
-    const std::vector<protocols::StimulusSpec>& stimuli = protocol.group_protocols[g]->stimuli;
-    for (std::size_t i = 0; i < stimuli.size() && faults.empty(); ++i)
-      check_meshes(stimuli[i].object,
-                   "/groups/patch/" + protocol.groups.names[g] + "/stimuli/" +
-                       std::to_string(stimuli[i].place),
-                   file, builder, faults);
-  }
+  const std::vector<protocols::Fault> faults = touch::mesh_faults(protocol, file, builder);
   if (!faults.empty()) throw protocols::InputError(faults);
   if (!request.json) return print_protocol(protocol, std::move(builder), request.measured, out);
-  const std::vector<std::string> notes = notes_on(protocol, builder);
+  const std::vector<std::string> notes = touch::stimulus_notes(protocol, builder);
   const StimulusLibrary library(protocol, std::move(builder));
   out << json_line(station::protocol_json(file, protocol, library, request.measured, notes));
 }
