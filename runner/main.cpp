@@ -48,6 +48,8 @@ constexpr Command kCommands[] = {
      palpate::runner::commands::check_command},
     {"cluster", "a sweep, a study or a plan as one array job on Slurm",
      palpate::runner::commands::cluster_command},
+    {"design", "a page to write, look at and rehearse a protocol",
+     palpate::runner::commands::design_command},
     {"devices", "connected devices and their limits; timing of this machine; calibration",
      palpate::runner::commands::devices_command},
     {"explore", "a window to touch a scene; pictures of it",

@@ -56,6 +56,10 @@ MAY_INCLUDE = {
                              "analysis/input", "analysis/report", "analysis/statistics", "runner/output", "runner/participants", "runner/safety",
                              "runner/session"},
     "runner/serve": SERVO | {"protocols", "runner/safety", "runner/session"},
+    # A page to write a protocol.
+    "runner/design": SERVO | {"protocols", "data", "data/files", "data/store", "analysis", "analysis/input", "analysis/report",
+                              "analysis/statistics", "runner/participants", "runner/serve", "runner/session", "runner/station",
+                              "runner/study", "runner/touch"},
     "runner/sweep": SERVO | {"protocols", "data", "data/files", "data/store", "runner/output", "runner/participants", "runner/session"},
     "runner/output": {"stimuli", "data", "data/files", "runner"},
     # Who takes part, with what.
@@ -154,6 +158,7 @@ PUBLIC = {
     "runner/registration": "about_file answers bundle_contents deviations planned_conditions planned_studies registration registration_text sealed_folder",
     "runner/study": "cue_study export_settings simulation_limits study_order study_trials task_words",
     "runner/serve": "loopback network page_server served_scene served_session",
+    "runner/design": "design_page protocol_file rehearsal",
     "runner/sweep": "cluster_folder cluster_job slurm swept_study",
     "runner/evidence/stability": "boundary effect_stability scene_boundary",
     "runner/evidence": "tick_meters",

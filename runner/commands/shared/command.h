@@ -46,6 +46,7 @@ int bench_command(const std::vector<std::string>& args);
 int bundle_command(const std::vector<std::string>& args);
 int check_command(const std::vector<std::string>& args);
 int cluster_command(const std::vector<std::string>& args);
+int design_command(const std::vector<std::string>& args);
 int devices_command(const std::vector<std::string>& args);
 int explore_command(const std::vector<std::string>& args);
 int export_command(const std::vector<std::string>& args);

@@ -63,18 +63,26 @@ class Browser:
 
     def call(self, method, **params):
         self.number += 1
-        message = {"id": self.number, "method": method, "params": params}
+        number = self.number
+        message = {"id": number, "method": method, "params": params}
         if self.session:
             message["sessionId"] = self.session
         os.write(self.write_end, json.dumps(message).encode() + b"\0")
         while True:
             answer = self._read()
-            if answer.get("id") == self.number:
+            if answer.get("id") == number:
                 if "error" in answer:
                     raise RuntimeError(f"{method}: {answer['error']}")
                 return answer["result"]
             if "method" in answer:
-                self.events.append((answer["method"], answer["params"]))
+                self._take(answer)
+
+    def _take(self, event):
+        self.events.append((event["method"], event["params"]))
+        if event["method"] == "Page.javascriptDialogOpening":  # a page asks whether it may be left: yes
+            self.number += 1
+            os.write(self.write_end, json.dumps({"id": self.number, "method": "Page.handleJavaScriptDialog",
+                                                 "params": {"accept": True}, "sessionId": self.session}).encode() + b"\0")
 
     def open(self, path):
         """Loads a file and waits until it is loaded."""
@@ -86,7 +94,7 @@ class Browser:
         while not any(name == "Page.loadEventFired" for name, _ in self.events):
             message = self._read()
             if "method" in message:
-                self.events.append((message["method"], message["params"]))
+                self._take(message)
 
     def run(self, script):
         """Evaluates an expression in the page; awaits promises."""

@@ -1,0 +1,135 @@
+// palpate design: a page to write, look at and rehearse a protocol.
+
+import {CheckLoop} from './check_loop.js';
+import {Document} from './document.js';
+import {OrderView} from './order_view.js';
+import {PictureView} from './picture_view.js';
+import {RehearseView} from './rehearse_view.js';
+import {TextView} from './text_view.js';
+import {ask, on_connection} from './server.js';
+import {by_id, element} from './dom.js';
+import {choose_template} from './start_view.js';
+import {save} from './save.js';
+import {show_check} from './check_view.js';
+
+function banner(words) {
+  by_id('banner').textContent = words;
+  by_id('banner').hidden = words === '';
+}
+
+class Page {
+  constructor(opened) {
+    this.document = new Document(opened);
+    this.views = new Map([
+      ['text', {title: 'The file', view: new TextView(this.document)}],
+      ['order', {title: 'Order of a participant', view: new OrderView(this.document)}],
+      ['rehearse', {title: 'Rehearse', view: new RehearseView(this.document)}],
+    ]);
+    this.picture = new PictureView();
+    this.checks = new CheckLoop(this.document, {
+      checked: (check, values) => this.#checked(check, values),
+      pictured: (picture, values) => this.picture.show(picture, Array.isArray(values?.stimuli) ? values.stimuli : []),
+    });
+    this.#listen();
+    by_id('file').textContent = opened.name;
+    by_id('file').title = opened.path;
+    document.title = `${opened.name} - palpate design`;
+    by_id('work').hidden = false;
+    this.#outline();
+    this.go('text');
+    this.#state();
+    this.checks.begin();
+  }
+
+  #outline() {
+    by_id('outline').replaceChildren(...[...this.views].map(([name, {title}]) =>
+        element('button', {type: 'button', 'data-view': name, onclick: () => this.go(name)}, element('span', {text: title}))));
+  }
+
+  go(name) {
+    this.shown = name;
+    const {view} = this.views.get(name);
+    for (const button of by_id('outline').querySelectorAll('button')) {
+      if (button.dataset.view === name) button.setAttribute('aria-current', 'page');
+      else button.removeAttribute('aria-current');
+    }
+    by_id('view').replaceChildren(view.root);
+    view.show();
+  }
+
+  #listen() {
+    this.document.listen(() => {
+      this.#state();
+      this.views.get(this.shown)?.view.show();
+      this.checks.begin();
+    });
+    by_id('undo').addEventListener('click', () => this.document.undo());
+    by_id('redo').addEventListener('click', () => this.document.redo());
+    by_id('save').addEventListener('click', () => this.save());
+    addEventListener('beforeunload', event => {
+      if (!this.document.is_saved) event.preventDefault();
+    });
+    addEventListener('keydown', event => this.#key(event));
+    on_connection(is_there => banner(is_there ? '' : 'palpate design has ended. This page keeps your text: start it again and open the new address, or copy the text from here.'));
+  }
+
+  #key(event) {
+    if (!(event.ctrlKey || event.metaKey) || event.altKey) return;
+    const key = event.key.toLowerCase();
+    if (key === 's') {
+      event.preventDefault();
+      this.save();
+    } else if (key === 'z' || key === 'y') {
+      // A field that is being typed in has a history of its own.
+      if (event.target.matches?.('input, textarea') && event.target !== this.views.get('text').view.area) return;
+      event.preventDefault();
+      if (key === 'y' || event.shiftKey) this.document.redo();
+      else this.document.undo();
+    }
+  }
+
+  #state() {
+    const {document} = this;
+    const kind = document.exists ? '' : ', a new file';
+    by_id('saved').textContent = document.is_saved ? 'saved' : `not saved yet${kind}`;
+    by_id('save').disabled = document.is_saved;
+    by_id('undo').disabled = !document.can_undo;
+    by_id('redo').disabled = !document.can_redo;
+  }
+
+  async save() {
+    if (this.document.is_saved || this.saving) return;
+    this.saving = true;
+    const focused = document.activeElement;
+    try {
+      const words = await save(this.document, this.checks.faults);
+      if (words) by_id('saved').textContent = words;
+    } catch (error) {
+      by_id('saved').textContent = `Not saved: ${error.message}`;
+    }
+    this.saving = false;
+    if (focused?.isConnected) focused.focus();
+  }
+
+  #checked(check, values) {
+    show_check(check, values, fault => this.#go_to(fault));
+    this.views.get('text').view.mark(check.faults);
+  }
+
+  #go_to(fault) {
+    this.go('text');
+    if (fault.line) this.views.get('text').view.go_to_line(fault.line);
+  }
+}
+
+async function begin() {
+  const opened = await ask('open');
+  let text = null;
+  if (!opened.exists) text = await choose_template(opened);
+  const page = new Page(opened);
+  if (text !== null) page.document.edit(text);
+  // Gives access to the page from the browser's console, and to tests.
+  window.design = page;
+}
+
+begin().catch(error => banner(error.message));

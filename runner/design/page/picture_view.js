@@ -1,0 +1,151 @@
+// The stimuli at one scale beside the stylus. Dragging or the arrow keys turn each about its own centre.
+
+import {by_id, element} from './dom.js';
+import {label_of, value_in_words} from './units.js';
+
+/* global palpate_drawing */  // of drawing.js
+const {add, sub, times, size, surface_of, axes_of, painter, kLight, kDark} = palpate_drawing;
+const kGap = 0.14;    // of the largest stimulus
+const kFoot = 34;     // px below a row, for names
+const dark = matchMedia('(prefers-color-scheme: dark)');
+
+/** What a picture cannot show of a stimulus: its texture, fields, knock, layers, what is seen of it. */
+export function stimulus_in_words(stimulus) {
+  const words = [];
+  const told = (name, part) => {
+    if (part === null || typeof part !== 'object') return;
+    const values = Object.entries(part).map(([key, value]) =>
+        (typeof value === 'object' && !Array.isArray(value)) ? '' : `${label_of(key)} ${value_in_words(key, value)}`);
+    words.push(`${name}: ${values.filter(Boolean).join(', ')}`);
+  };
+  told('texture', stimulus.texture);
+  for (const field of stimulus.fields ?? []) told('field', field);
+  for (const layer of stimulus.layers ?? []) told('layer', layer);
+  told('knock', stimulus.contact_transient);
+  for (const [name, key] of [['moves', 'body'], ['gives', 'soft'], ['seen', 'seen'], ['sound', 'sound']]) told(name, stimulus[key]);
+  if (stimulus.felt === false) words.push('not felt');
+  for (const key of ['stiffness_n_per_m', 'friction_static']) {
+    const value = stimulus.material?.[key] ?? stimulus[key];
+    if (value !== undefined) words.push(`${label_of(key)} ${value_in_words(key, value)}`);
+  }
+  return words;
+}
+
+const in_mm = metres => metres.map(m => +(1000 * m).toPrecision(3)).join(' × ') + ' mm';
+
+export class PictureView {
+  constructor() {
+    this.root = by_id('picture');
+    this.canvas = this.root.querySelector('canvas');
+    this.labels = this.root.querySelector('.labels');
+    this.turn = {yaw: -0.5, pitch: 0.42};
+    this.stage = {camera: {yaw: 0, pitch: 0, zoom: 1}, radius: 0.08, centre: [0, 0, 0], metres_a_newton: 0.02, colours: () => (dark.matches ? kDark : kLight)};
+    this.paint = painter(this.canvas, this.stage);
+    this.shapes = [];
+    if (!this.paint) this.root.querySelector('.stage').hidden = true;
+    this.#listen();
+  }
+
+  #listen() {
+    const redraw = () => requestAnimationFrame(() => this.draw());
+    dark.addEventListener('change', redraw);
+    new ResizeObserver(redraw).observe(this.canvas);
+    const turn = (yaw, pitch) => {
+      this.turn.yaw += yaw;
+      this.turn.pitch = Math.min(Math.max(this.turn.pitch + pitch, -1.57), 1.57);
+      redraw();
+    };
+    this.canvas.addEventListener('pointerdown', event => this.canvas.setPointerCapture(event.pointerId));
+    this.canvas.addEventListener('pointermove', event => event.buttons && turn(-0.008 * event.movementX, 0.008 * event.movementY));
+    this.canvas.addEventListener('keydown', event => {
+      const by = {ArrowLeft: [0.1, 0], ArrowRight: [-0.1, 0], ArrowUp: [0, 0.1], ArrowDown: [0, -0.1]}[event.key];
+      if (!by) return;
+      event.preventDefault();
+      turn(...by);
+    });
+  }
+
+  /** Shows an answer of "picture". `stimuli`: as the protocol has them, for what a picture cannot show. */
+  show({stimuli, stylus}, protocol_stimuli) {
+    this.shapes = stimuli.filter(one => one.corners.length > 0).map(one => {
+      const ends = pick => [0, 1, 2].map(k => one.corners.reduce((v, p) => pick(v, p[k]), one.corners[0][k]));
+      const low = ends(Math.min), centre = times(0.5, add(low, ends(Math.max)));
+      const corners = one.corners.map(p => sub(p, centre));
+      return {name: one.name, size: one.size_m, mesh: surface_of(corners, one.triangles), radius: corners.reduce((r, p) => Math.max(r, size(p)), 0)};
+    });
+    this.stylus = stylus;
+    const known = new Map(protocol_stimuli.map(one => [one.name, stimulus_in_words(one)]));
+    this.root.querySelector('.sizes').replaceChildren(...stimuli.map(one => {
+      const words = [one.size_m ? in_mm(one.size_m) : 'no surface', ...(known.get(one.name.replace(/\[.*/, '')) ?? [])];
+      if (one.all_triangles) words.push(`drawn with ${one.triangles.length} of its ${one.all_triangles} triangles`);
+      return element('li', {}, element('b', {text: one.name}), ` ${words.join('; ')}`);
+    }));
+    const note = this.root.querySelector('.note');
+    note.hidden = Boolean(this.paint);
+    note.textContent = 'This browser has no WebGL: sizes in words.';
+    this.canvas.setAttribute('aria-label', `Stimuli at true scale beside the stylus: ${this.shapes.map(one => `${one.name} ${in_mm(one.size)}`).join(', ')}. Drag, or the arrow keys, to turn them.`);
+    this.draw();
+  }
+
+  /** Rows of cells as wide as the largest stimulus, and the stylus at the right. */
+  #layout(width, height) {
+    const largest = Math.max(...this.shapes.map(one => one.radius), 1e-4);
+    const cell = 2 * largest * (1 + kGap), reach = this.stylus.reach ?? 1;
+    const long = this.stylus.length_m * Math.max(1, reach);
+    let best = null;
+    for (let columns = 1; columns <= Math.max(1, this.shapes.length); ++columns) {
+      const rows = Math.max(1, Math.ceil(this.shapes.length / columns));
+      const w = columns * cell + 0.6 * cell;
+      const scale = Math.min(width / w, (height - rows * kFoot - 12) / Math.max(rows * cell, long * (rows === 1 ? 1 : 1.02)));
+      if (!best || scale > best.scale) best = {columns, rows, scale, cell, long, w};
+    }
+    return best;
+  }
+
+  draw() {
+    const width = this.canvas.clientWidth, height = this.canvas.clientHeight;
+    if (!this.paint || !this.stylus || width === 0) return;
+    const {columns, rows, scale, cell, long, w} = this.#layout(width, height);
+    this.stage.radius = height / (3.4 * scale);
+    const to_px = ([x, , z]) => [width / 2 + x * scale, height / 2 - z * scale];
+    const {right, into, up} = axes_of(this.turn);
+    const column = k => [right[k], into[k], up[k]];
+    const turned = {x: column(0), y: column(1), z: column(2)};
+    const labels = [], objects = [];
+    const row_height = Math.max(cell + kFoot / scale, rows === 1 ? long + 16 / scale : 0);
+    this.shapes.forEach((shape, i) => {
+      const row = Math.floor(i / columns), in_row = Math.min(columns, this.shapes.length - row * columns);
+      const o = [-w / 2 + cell * (0.5 + (i % columns) + (columns - in_row) / 2), 0, ((rows - 1) / 2 - row) * row_height + kFoot / scale / 2];
+      objects.push({mesh: shape.mesh, object: {...turned, o}});
+      const [x, y] = to_px([o[0], 0, o[2] - shape.radius]);
+      labels.push(element('span', {text: shape.name}));
+      place(labels.at(-1), x, Math.min(y + 2, height - 18));
+    });
+    const foot = [w / 2 - 0.3 * cell, 0, -long / 2 + kFoot / scale / 2];
+    const at = z => add(foot, [0, 0, z]);
+    const segments = this.stylus.segments?.map(([a, b]) => [add(foot, a), add(foot, b)]) ?? [[at(0), at(long)]];
+    this.paint({objects, mesh: null, virtual: [], ideal: segments, contact: null, force: [0, 0, 0]});
+    const [x, y] = to_px(foot);
+    const reach = this.stylus.reach && this.stylus.reach !== 1 ? `, ×${this.stylus.reach}` : '';
+    labels.push(element('span', {text: `stylus${reach}`}));
+    place(labels.at(-1), Math.min(x, width - 30), Math.min(y + 6, height - 18));
+    labels.push(scale_bar(scale, width));
+    this.labels.replaceChildren(...labels);
+  }
+}
+
+function place(label, x, y) {
+  label.style.left = `${x}px`;
+  label.style.top = `${y}px`;
+}
+
+/** A round length of at most a quarter of the width. */
+function scale_bar(scale, width) {
+  const most = 0.25 * width / scale, power = 10 ** Math.floor(Math.log10(most));
+  const length = [5, 2, 1].map(n => n * power).find(one => one <= most) ?? power;
+  const bar = element('span', {class: 'scale'}, element('b', {text: length < 1 ? `${+(1000 * length).toPrecision(2)} mm` : `${length} m`}));
+  bar.style.left = '10px';
+  bar.style.top = '22px';
+  bar.style.width = `${length * scale}px`;
+  return bar;
+}

@@ -1,0 +1,344 @@
+"""palpate design without a browser: who may ask, what is answered, what is written and what is not.
+
+Usage: design_http_test.py PALPATE PROTOCOLS
+"""
+
+import hashlib
+import json
+import os
+import pathlib
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+import unittest
+
+sys.dont_write_bytecode = True
+from design_case import PALPATE, PATIENCE, PROTOCOLS, DesignCase  # noqa: E402
+
+PROTOCOL_FILES = sorted(path for path in PROTOCOLS.glob("*.json") if ".texts." not in path.name and "schema" not in path.name)
+
+
+def sha256(text):
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+class Access(DesignCase):
+    def setUp(self):
+        super().setUp()
+        self.design(self.copy("quick.json"))
+
+    def test_the_page_carries_no_token(self):
+        status, headers, body = self.request("GET", "/")
+        self.assertEqual(status, 200)
+        self.assertNotIn(self.token.encode(), body)
+        policy = headers["Content-Security-Policy"]
+        nonce = re.search("script-src 'nonce-([0-9a-f]{32})'", policy)[1]
+        self.assertIn("default-src 'none'", policy)
+        self.assertIn("connect-src 'self'", policy)
+        self.assertIn("frame-ancestors 'none'", policy)
+        self.assertIn(f'nonce="{nonce}"'.encode(), body)
+        self.assertEqual(headers["Cache-Control"], "no-store")
+        self.assertEqual(headers["Referrer-Policy"], "no-referrer")
+        again = self.request("GET", "/")[1]["Content-Security-Policy"]
+        self.assertNotIn(nonce, again)
+
+    def test_messages_need_the_token(self):
+        for token in ("", "0" * 32, self.token[:-1], self.token + "0"):
+            status, _, body = self.request("POST", "/open", "{}", X_Palpate_Token=token)
+            self.assertEqual((status, body), (403, b"this is not the server's token\n"))
+        self.assertEqual(self.request("POST", "/open", "{}")[0], 403)
+        self.assertEqual(self.request("GET", "/open")[0], 404)
+        self.assertEqual(self.request("PUT", "/open", "{}", X_Palpate_Token=self.token)[0], 405)
+
+    def test_foreign_names_and_origins_are_refused(self):
+        for host in ("palpate.example", f"evil.example:{self.port}", "127.0.0.1.evil.example"):
+            self.assertEqual(self.request("GET", "/", Host=host)[0], 403, host)
+        for origin in ("https://evil.example", "null", f"http://127.0.0.1:{self.port + 1}"):
+            status, headers, _ = self.request("POST", "/open", "{}", X_Palpate_Token=self.token, Origin=origin)
+            self.assertEqual(status, 403, origin)
+            self.assertNotIn("Access-Control-Allow-Origin", headers)
+        own = f"http://127.0.0.1:{self.port}"
+        self.assertEqual(self.request("POST", "/open", "{}", X_Palpate_Token=self.token, Origin=own)[0], 200)
+        # A browser asks first whether another origin may send the header: it may not.
+        status, headers, _ = self.request("OPTIONS", "/open", Origin="https://evil.example")
+        self.assertEqual(status, 403)
+        self.assertNotIn("Access-Control-Allow-Headers", headers)
+
+    def test_bodies_above_16_mib_are_refused(self):
+        status, _, body = self.request("POST", "/check", b'{"text":"' + b"x" * (17 << 20) + b'"}', X_Palpate_Token=self.token)
+        self.assertEqual((status, body), (413, b"at most 16777216 bytes\n"))
+        text = "x" * (15 << 20)
+        self.assertEqual(self.ask("check", text=text)["faults"][0]["pointer"], "line 1, column 1")
+
+    def test_slow_headers_are_closed(self):
+        began = time.monotonic()
+        with socket.create_connection(("127.0.0.1", self.port), PATIENCE) as slow:
+            slow.sendall(b"POST /open HTTP/1.1\r\nHost: 127.0.0.1\r\n")
+            self.assertEqual(self.ask("open")["name"], "p.json")  # others are not held up
+            self.assertEqual(slow.recv(100), b"")
+        self.assertGreater(time.monotonic() - began, 1)
+
+    def test_a_hundred_open_connections_shut_nobody_out(self):
+        waiting = [socket.create_connection(("127.0.0.1", self.port), PATIENCE) for _ in range(100)]
+        self.assertEqual(self.ask("open")["name"], "p.json")
+        for one in waiting:
+            one.close()
+
+    def test_unreadable_messages_are_refused(self):
+        for body in ("", "[]", "{", "7", '{"text": 7}', "\xff"):
+            status, _, answer = self.request("POST", "/check", body.encode("latin-1"), X_Palpate_Token=self.token)
+            self.assertIn(status, (400, 409), body)
+            self.assertIn("error", json.loads(answer))
+        self.ask("schedule", 409, text="{}", participant=0)
+        self.ask("rehearse", 409, text="{}", participants=1000)
+        self.assertEqual(self.request("POST", "/mystery", '{"text": ""}', X_Palpate_Token=self.token)[0], 404)
+        self.assertEqual(self.request("GET", "/../p.json")[0], 404)
+        self.assertEqual(self.request("GET", "/report/" + "0" * 32)[0], 404)
+
+
+class Answers(DesignCase):
+    def test_the_check_says_what_validate_says(self):
+        self.design(self.copy("quick.json"))
+        for path in PROTOCOL_FILES:
+            if '"file"' in path.read_text():
+                continue
+            with self.subTest(path.name):
+                said = subprocess.run([PALPATE, "validate", "--json", path], capture_output=True, text=True, timeout=PATIENCE)
+                expected, found = json.loads(said.stdout), self.ask("check", text=path.read_text(encoding="utf-8"))
+                for key in ("faults", "summary", "devices", "duration_s", "longest_s", "notes"):
+                    self.assertEqual(found[key], expected[key], key)
+
+    def test_faults_of_bad_files_are_those_of_validate(self):
+        folder = self.dir / "bad"
+        shutil.copytree(pathlib.Path(__file__).parents[2] / "protocols" / "bad", folder)
+        self.design(folder / "new.json")
+        bad = sorted(folder.glob("*.json"))
+        self.assertGreater(len(bad), 20)
+        for path in bad:
+            try:
+                text = path.read_text(encoding="utf-8")
+            except UnicodeDecodeError:
+                continue
+            if '"objects"' in text and '"version"' not in text:
+                continue  # a scene
+            with self.subTest(path.name):
+                said = subprocess.run([PALPATE, "validate", "--json", path], capture_output=True, text=True, timeout=PATIENCE)
+                faults = self.ask("check", text=text)["faults"]
+                self.assertTrue(faults)
+                self.assertEqual([(one["pointer"], one["line"], one["text"]) for one in faults],
+                                 [(one["pointer"], one["line"], one["text"]) for one in json.loads(said.stdout)["faults"]])
+
+    def test_the_order_is_that_of_schedule(self):
+        self.design(self.copy("quick.json"))
+        for name in ("quick.json", "stiffness-two-groups.json"):
+            said = subprocess.run([PALPATE, "schedule", PROTOCOLS / name, "--participant", "2", "--format", "json"],
+                                  capture_output=True, text=True, timeout=PATIENCE, check=True)
+            trials = json.loads(said.stdout)["trials"]
+            found = self.ask("schedule", text=(PROTOCOLS / name).read_text(encoding="utf-8"), participant=2)
+            self.assertEqual(found["all"], len(trials))
+            self.assertEqual([dict(zip(found["columns"], row)) for row in found["rows"]],
+                             [{column: trial[column] for column in found["columns"]} for trial in trials])
+            self.assertEqual(found.get("group"), "older" if "groups" in name else None)
+
+    def test_the_picture_has_true_sizes(self):
+        self.design(self.copy("quick.json"))
+        picture = self.ask("picture", text=(self.dir / "p.json").read_text())
+        sizes = {one["name"]: one["size_m"] for one in picture["stimuli"]}
+        self.assertEqual(set(sizes), {"sphere", "cone", "cylinder", "cube"})
+        for name, expected in (("cube", [0.06] * 3), ("cone", [0.06] * 3), ("sphere", [0.06] * 3)):
+            for got, wanted in zip(sizes[name], expected):
+                self.assertAlmostEqual(got, wanted, delta=2e-4)
+        self.assertEqual(picture["stylus"]["length_m"], 0.12)
+        for one in picture["stimuli"]:
+            self.assertLess(max(map(max, one["triangles"])), len(one["corners"]))
+
+
+class Files(DesignCase):
+    def test_saving_keeps_bytes_and_permissions(self):
+        path = self.copy("ho2000.json")
+        path.chmod(0o640)
+        self.design(path)
+        opened = self.ask("open")
+        text = path.read_text(encoding="utf-8")
+        self.assertEqual((opened["text"], opened["sha256"], opened["exists"]), (text, sha256(text), True))
+        other = "\ufeff" + text.replace("\n", "\r\n").replace("2000", "18446744073709551615")
+        self.assertEqual(self.ask("save", text=other, sha256=opened["sha256"]), {"sha256": sha256(other)})
+        self.assertEqual(path.read_bytes(), other.encode())
+        self.assertEqual(path.stat().st_mode & 0o777, 0o640)
+        self.assertEqual(sorted(one.name for one in self.dir.iterdir()), ["p.json", "temporary"])
+
+    def test_a_change_outside_is_not_overwritten(self):
+        path = self.copy("quick.json")
+        self.design(path)
+        known = self.ask("open")["sha256"]
+        path.write_text("theirs")
+        refused = self.ask("save", 409, text="mine", sha256=known)
+        self.assertEqual(refused["found"], {"text": "theirs", "sha256": sha256("theirs")})
+        self.assertEqual(path.read_text(), "theirs")
+        self.assertEqual(self.ask("copy", text="mine"), {"name": "p-2.json"})
+        self.assertEqual(self.ask("copy", text="mine too"), {"name": "p-3.json"})
+        self.assertEqual((self.dir / "p-2.json").read_text(), "mine")
+        self.ask("save", text="mine", sha256=refused["found"]["sha256"])
+        self.assertEqual(path.read_text(), "mine")
+
+    def test_a_removed_file_is_not_made_again_unasked(self):
+        path = self.copy("quick.json")
+        self.design(path)
+        known = self.ask("open")["sha256"]
+        path.unlink()
+        self.assertEqual(self.ask("save", 409, text="mine", sha256=known)["found"], {"text": "", "sha256": ""})
+        self.assertFalse(path.exists())
+        self.ask("save", text="mine", sha256="")
+        self.assertEqual(path.read_text(), "mine")
+
+    def test_protected_files_stay_as_they_are(self):
+        path = self.copy("quick.json")
+        before = path.read_bytes()
+        self.design(path)
+        path.chmod(0o444)
+        self.assertEqual(self.ask("save", 409, text="mine", sha256=sha256(before.decode()))["error"], "The file is write-protected.")
+        self.assertEqual(path.read_bytes(), before)
+
+    def test_bytes_that_are_no_text_are_never_lost(self):
+        path = self.copy("quick.json")
+        self.design(path)
+        known = self.ask("open")["sha256"]
+        path.write_bytes(b'{"title": "M\xfcller"}')
+        refused = self.ask("save", 409, text="mine", sha256=known)
+        self.assertIn("UTF-8", refused["error"])
+        self.assertNotIn("found", refused)
+        self.assertEqual(path.read_bytes(), b'{"title": "M\xfcller"}')
+
+    def test_links_stay_links(self):
+        target = self.copy("quick.json", "real.json")
+        link = self.dir / "p.json"
+        link.symlink_to(target)
+        self.design(link)
+        self.ask("save", text="mine", sha256=self.ask("open")["sha256"])
+        self.assertTrue(link.is_symlink())
+        self.assertEqual(target.read_text(), "mine")
+
+    def test_a_new_file_begins_with_templates(self):
+        self.design("new.json")
+        opened = self.ask("open")
+        self.assertEqual((opened["exists"], opened["text"], opened["sha256"]), (False, "", ""))
+        self.assertGreater(len(opened["templates"]), 10)
+        for one in opened["templates"]:
+            self.assertEqual(one["text"], (PROTOCOLS / f"{one['name']}.json").read_text(encoding="utf-8"))
+            self.assertEqual(self.ask("check", text=one["text"])["faults"], [], one["name"])
+        self.assertFalse((self.dir / "new.json").exists())
+        self.ask("save", text="mine", sha256="")
+        self.assertEqual((self.dir / "new.json").read_text(), "mine")
+
+    def test_without_a_name_no_file_is_taken(self):
+        (self.dir / "study.json").write_text("{}")
+        process = subprocess.Popen([PALPATE, "design", "--no-browser"], cwd=self.dir, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(process.communicate)
+        self.addCleanup(process.kill)
+        process.stdout.readline()
+        self.assertIn("study-2.json", process.stderr.readline())
+
+    def test_what_is_no_protocol_is_refused(self):
+        long = self.dir / "long.json"
+        long.write_bytes(b" " * (17 << 20))
+        for name, text in (("scene.json", '{"objects": []}'), ("v3.json", '{"version": 3, "stimuli": []}'), ("texts.json", '{"texts.go": "Los"}'),
+                           ("latin.json", b'{"version": 1, "title": "M\xfc"}'), ("p.txt", "{}"), ("none/p.json", None), ("long.json", None)):
+            path = self.dir / name
+            if text is not None:
+                path.write_bytes(text if isinstance(text, bytes) else text.encode())
+            done = subprocess.run([PALPATE, "design", path, "--no-browser"], capture_output=True, text=True, timeout=PATIENCE)
+            self.assertEqual(done.returncode, 2, name)
+            self.assertIn(path.name, done.stderr)
+
+
+class Rehearsals(DesignCase):
+    def rehearse(self, name="quick.json", **more):
+        self.ask("rehearse", text=(PROTOCOLS / name).read_text(encoding="utf-8"), **more)
+
+    def wait(self):
+        return self.until(lambda: (p := self.ask("progress"))["state"] != "running" and p)
+
+    def test_a_rehearsal_ends_with_a_report(self):
+        process = self.design(self.copy("quick.json"))
+        self.assertEqual(self.ask("progress"), {"state": "none"})
+        self.rehearse(participants=2)
+        progress = self.wait()
+        self.assertEqual((progress["state"], progress["recorded"]), ("done", 48), progress)
+        status, headers, page = self.request("GET", "/report/" + progress["report"])
+        self.assertEqual(status, 200)
+        self.assertIn(b"SIMULATED", page)
+        self.assertEqual(headers["Content-Security-Policy"], "sandbox allow-scripts allow-downloads")
+        self.assertEqual([one.name for one in self.dir.iterdir() if one.suffix == ".db"], [])
+        self.assertEqual(self.end(process), 0)
+        self.assertEqual(list(self.temporary.iterdir()), [])
+
+    def test_a_rehearsal_stops(self):
+        self.design(self.copy("ho2000.json"))
+        self.rehearse("ho2000.json", participants=40)
+        self.assertIn("already", self.ask("rehearse", 409, text="{}")["error"])
+        self.ask("stop")
+        self.assertEqual(self.wait()["state"], "stopped")
+        self.rehearse(participants=1)  # the next one is not held up
+        self.assertEqual(self.wait()["state"], "done")
+
+    def test_a_rehearsal_says_why_it_cannot_be(self):
+        self.design(self.copy("quick.json"))
+        text = (PROTOCOLS / "quick.json").read_text().replace('"radius_m": 0.03', '"radius_m": -3', 1)
+        self.assertIn("/stimuli/0/radius_m", self.ask("rehearse", 409, text=text)["error"])
+        self.assertEqual(self.ask("progress")["state"], "none")
+
+    def test_a_killed_server_leaves_nothing(self):
+        process = self.design(self.copy("ho2000.json"))
+        self.rehearse("ho2000.json", participants=40)
+        self.until(lambda: list(self.temporary.glob("*/*.db")))
+        self.end(process, signal.SIGKILL)
+        self.until(lambda: not list(self.temporary.iterdir()))
+        self.assertEqual(sorted(one.name for one in self.dir.iterdir()), ["p.json", "temporary"])
+
+    def test_signals_end_a_rehearsal(self):
+        process = self.design(self.copy("ho2000.json"))
+        self.rehearse("ho2000.json", participants=40)
+        self.assertEqual(self.end(process, signal.SIGTERM), 0)
+        self.assertEqual(list(self.temporary.iterdir()), [])
+
+    def test_a_session_is_not_disturbed(self):
+        self.design(self.copy("quick.json"))
+        scene = self.dir / "scene.json"
+        scene.write_text('{"objects": [{"shape": "sphere", "radius_m": 0.03, "stiffness_n_per_m": 50}]}')
+        session = subprocess.Popen([PALPATE, "serve", "--device", "simulated", "--scene", scene, "--rate", "100"], stdout=subprocess.PIPE,
+                                   stderr=subprocess.DEVNULL, text=True)
+        try:
+            session.stdout.readline()
+            error = self.ask("rehearse", 409, text=(PROTOCOLS / "quick.json").read_text())["error"]
+            self.assertTrue(error.startswith("palpate serve runs on this computer"), error)
+        finally:
+            session.kill()
+            session.communicate()
+        self.rehearse(participants=1)
+        self.assertEqual(self.wait()["state"], "done")
+
+    def test_a_session_that_begins_ends_it(self):
+        self.design(self.copy("ho2000.json"))
+        self.rehearse("ho2000.json", participants=40)
+        scene = self.dir / "scene.json"
+        scene.write_text('{"objects": [{"shape": "sphere", "radius_m": 0.03, "stiffness_n_per_m": 50}]}')
+        session = subprocess.Popen([PALPATE, "serve", "--device", "simulated", "--scene", scene, "--rate", "100"], stdout=subprocess.DEVNULL,
+                                   stderr=subprocess.DEVNULL)
+        try:
+            progress = self.wait()
+            self.assertEqual((progress["state"], progress["why"]), ("stopped", "palpate serve has begun on this computer."))
+        finally:
+            session.kill()
+            session.wait()
+
+    def test_it_runs_below_others(self):
+        process = self.design(self.copy("quick.json"))
+        self.assertEqual(os.getpriority(os.PRIO_PROCESS, process.pid), min(19, os.getpriority(os.PRIO_PROCESS, 0) + 10))
+
+
+if __name__ == "__main__":
+    unittest.main()
