@@ -4,7 +4,7 @@
   const $ = id => document.getElementById(id);
   const given = JSON.parse($('ticks').textContent);
   const kSpeeds = [0.05, 0.1, 0.2, 0.5, 1, 2, 4];
-  const {add, sub, times, dot, cross, size, unit, frame, turned, placed, joined, surface_of, axes_of, painter, kLight,
+  const {add, sub, times, dot, cross, size, unit, frame, turned, placed, joined, surface_of, painter, kLight,
          kDark} = palpate_drawing;
 
   // ---- numbers -------------------------------------------------------------------------------

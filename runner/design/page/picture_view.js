@@ -3,7 +3,6 @@
 import {by_id, element} from './dom.js';
 import {label_of, value_in_words} from './units.js';
 
-/* global palpate_drawing */  // of drawing.js
 const {add, sub, times, size, surface_of, axes_of, painter, kLight, kDark} = palpate_drawing;
 const kGap = 0.14;    // of the largest stimulus
 const kFoot = 34;     // px below a row, for names
