@@ -136,7 +136,7 @@ class ParticipantScreen {
   virtual ~ParticipantScreen() = default;
   virtual void show(const Page& page) = 0;
   /// From now on draws this behind the pages; null: nothing. A screen of text draws nothing.
-  virtual void see(std::shared_ptr<const SeenTrial> /*trial*/) {}
+  virtual void see(const std::shared_ptr<const SeenTrial>& /*trial*/) {}
   /// Passes a tick of the trial that is seen.
   virtual void follow(const servo::Sample& /*sample*/) {}
   /// The frames since the last call.

@@ -331,10 +331,10 @@ bool ParticipantWindow::turn_page(const std::string& key) {
   return true;
 }
 
-void ParticipantWindow::see(std::shared_ptr<const SeenTrial> trial) {
+void ParticipantWindow::see(const std::shared_ptr<const SeenTrial>& trial) {
   last_moment_.reset();
   trail_.clear();
-  to_see_.put(std::move(trial));
+  to_see_.put(trial);
 }
 
 void ParticipantWindow::follow(const servo::Sample& sample) {

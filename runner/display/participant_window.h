@@ -69,7 +69,7 @@ class ParticipantWindow final : public ParticipantScreen {
   ~ParticipantWindow() override;
 
   void show(const Page& page) override { pages_.put(page); }
-  void see(std::shared_ptr<const SeenTrial> trial) override;
+  void see(const std::shared_ptr<const SeenTrial>& trial) override;
   void follow(const servo::Sample& sample) override;
   std::vector<SeenFrame> frames() override { return frames_.take(); }
   std::vector<KeyPress> keys() override { return keys_.take(); }

@@ -462,7 +462,7 @@ void KeyboardRespondent::see(const protocols::Trial& trial, const protocols::Int
   if (seen == nullptr && !sees_) return;
   sees_ = seen != nullptr;
   if (sees_) delay_ = seen->seen.delay;
-  screen_.see(std::move(seen));
+  screen_.see(seen);
 }
 
 std::optional<data::SeenRecord> KeyboardRespondent::seen() {

@@ -183,9 +183,7 @@ class ScreenWithBox final : public display::ParticipantScreen {
   ScreenWithBox(display::ParticipantScreen& screen, ResponseBox& box)
       : screen_(screen), box_(box) {}
   void show(const display::Page& page) override { screen_.show(page); }
-  void see(std::shared_ptr<const display::SeenTrial> trial) override {
-    screen_.see(std::move(trial));
-  }
+  void see(const std::shared_ptr<const display::SeenTrial>& trial) override { screen_.see(trial); }
   void follow(const servo::Sample& sample) override { screen_.follow(sample); }
   std::vector<display::SeenFrame> frames() override { return screen_.frames(); }
   std::vector<display::KeyPress> keys() override;

@@ -23,7 +23,8 @@ std::optional<data::SeenRecord> seen_record(const std::vector<display::SeenFrame
   std::ranges::sort(lags);
   std::ranges::sort(steps);
   const auto quantile = [](const std::vector<double>& sorted, double share) {
-    return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1) + 0.5)];
+    return sorted[static_cast<std::size_t>(
+        std::lround(share * static_cast<double>(sorted.size() - 1)))];
   };
   data::SeenRecord out;
   out.frames = static_cast<int>(frames.size());

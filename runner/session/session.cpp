@@ -126,10 +126,10 @@ void Session::prepare_interval(const protocols::Trial& trial, const protocols::I
   record.renderer = protocols::to_string(interval.renderer);
   record.level = interval.level;
   record.standard = interval.standard;
-  rendering::Scene scene = scenes_.scene(trial, interval);
+  const rendering::Scene scene = scenes_.scene(trial, interval);
   const rendering::Renderer& renderer = renderer_for(interval.renderer);
   power_.begin(scene, renderer.side_contact());
-  station_.servo.prepare(std::move(scene), renderer, home);
+  station_.servo.prepare(scene, renderer, home);
 }
 
 servo::HomeZone Session::home_of(const protocols::Interval& interval, double rest) const {
