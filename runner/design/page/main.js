@@ -2,13 +2,16 @@
 
 import {CheckLoop} from './check_loop.js';
 import {Document} from './document.js';
+import {Form} from './form.js';
 import {OrderView} from './order_view.js';
+import {PartView, kParts, part_of} from './parts_view.js';
 import {PictureView} from './picture_view.js';
 import {RehearseView} from './rehearse_view.js';
 import {TextView} from './text_view.js';
 import {ask, on_connection} from './server.js';
 import {by_id, element} from './dom.js';
 import {choose_template} from './start_view.js';
+import {load_schemas} from './schema.js';
 import {save} from './save.js';
 import {show_check} from './check_view.js';
 
@@ -18,9 +21,11 @@ function banner(words) {
 }
 
 class Page {
-  constructor(opened) {
+  constructor(opened, schema_of) {
     this.document = new Document(opened);
+    this.form = new Form(this.document, schema_of);
     this.views = new Map([
+      ...kParts.map(part => [part.name, {title: part.title, part, view: new PartView(this.form, part)}]),
       ['text', {title: 'The file', view: new TextView(this.document)}],
       ['order', {title: 'Order of a participant', view: new OrderView(this.document)}],
       ['rehearse', {title: 'Rehearse', view: new RehearseView(this.document)}],
@@ -36,14 +41,25 @@ class Page {
     document.title = `${opened.name} - palpate design`;
     by_id('work').hidden = false;
     this.#outline();
-    this.go('text');
+    this.go(this.form.read() ? 'stimuli' : 'text');
     this.#state();
     this.checks.begin();
   }
 
   #outline() {
-    by_id('outline').replaceChildren(...[...this.views].map(([name, {title}]) =>
-        element('button', {type: 'button', 'data-view': name, onclick: () => this.go(name)}, element('span', {text: title}))));
+    by_id('outline').replaceChildren(...[...this.views].flatMap(([name, {title}]) => [
+      name === 'text' ? element('hr') : null,
+      element('button', {type: 'button', 'data-view': name, onclick: () => this.go(name)}, element('span', {text: title})),
+    ].filter(Boolean)));
+    this.#fit_outline();
+  }
+  /** Parts that a protocol of this version has. */
+  #fit_outline() {
+    const version = this.form.read() ? this.form.values.version : undefined;
+    for (const button of by_id('outline').querySelectorAll('button')) {
+      const {part} = this.views.get(button.dataset.view);
+      button.hidden = part?.version === 2 && version === 1;
+    }
   }
 
   go(name) {
@@ -60,7 +76,9 @@ class Page {
   #listen() {
     this.document.listen(() => {
       this.#state();
-      this.views.get(this.shown)?.view.show();
+      this.#fit_outline();
+      // The focus moves first: a form that is built again gives it back to where it then is.
+      if (!this.form.quiet) setTimeout(() => this.views.get(this.shown)?.view.show(), 0);
       this.checks.begin();
     });
     by_id('undo').addEventListener('click', () => this.document.undo());
@@ -114,19 +132,34 @@ class Page {
   #checked(check, values) {
     show_check(check, values, fault => this.#go_to(fault));
     this.views.get('text').view.mark(check.faults);
+    for (const [name, {part, view}] of this.views) {
+      if (!part) continue;
+      const own = check.faults.filter(({pointer}) => pointer.startsWith('/') && part_of(pointer) === name);
+      view.mark(own);
+      const button = by_id('outline').querySelector(`[data-view="${name}"]`);
+      button.querySelector('.count')?.remove();
+      if (own.length) button.append(element('span', {class: 'count', title: 'faults', text: String(own.length)}));
+    }
   }
 
+  /** Shows a fault where it is looked at: at its field, or in its line. */
   #go_to(fault) {
-    this.go('text');
-    if (fault.line) this.views.get('text').view.go_to_line(fault.line);
+    if (this.shown === 'text' || !fault.pointer.startsWith('/') || !this.form.read()) {
+      this.go('text');
+      if (fault.line) this.views.get('text').view.go_to_line(fault.line);
+      return;
+    }
+    const name = part_of(fault.pointer);
+    this.go(name);
+    this.views.get(name).view.go_to_fault(fault);
   }
 }
 
 async function begin() {
-  const opened = await ask('open');
+  const [opened, schema_of] = await Promise.all([ask('open'), load_schemas()]);
   let text = null;
   if (!opened.exists) text = await choose_template(opened);
-  const page = new Page(opened);
+  const page = new Page(opened, schema_of);
   if (text !== null) page.document.edit(text);
   // Gives access to the page from the browser's console, and to tests.
   window.design = page;

@@ -60,3 +60,16 @@ export function value_in_words(key, value) {
   const text = typeof value === 'number' ? one(value) : Array.isArray(value) ? numbers(value) : String(value);
   return unit ? `${text} ${unit}` : text;
 }
+
+/** A description for people: without the unit that stands beside the field, its lengths in mm. */
+export function hint_in_words(key, words) {
+  const {unit, shift} = unit_of(key);
+  if (!unit) return words;
+  const own = shift === 0 ? unit : 'm';
+  let text = words === own || words.startsWith(`${own};`) || words.startsWith(`${own},`) || words.startsWith(`${own}.`) ? words.slice(own.length + 1).trim() : words;
+  if (shift !== 0) {
+    const moved = (all, before, number) => `${before}${shifted(number, shift) ?? number} mm`;
+    text = text.replace(/(default )(\d+(?:\.\d+)?)(?! *mm)/g, moved).replace(/((?:^|[ (]))(\d+(?:\.\d+)?) m\b/g, moved);
+  }
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}

@@ -1,0 +1,93 @@
+// Edits of the text that follow the schema: a member set or removed, and what a decision (shape, task, kind) makes of
+// the members beside it.
+
+import {node_at, parse, replaced, with_item, with_member, without_member} from './json_text.js';
+import {schema_at, type_of} from './schema.js';
+
+/** JSON of a value in one line, as people write it: {"name": "cone", "radius_m": 0.03}. */
+export function written(value) {
+  const type = type_of(value);
+  if (type === 'array') return `[${value.map(written).join(', ')}]`;
+  if (type === 'object') return `{${Object.entries(value).map(([key, inner]) => `${JSON.stringify(key)}: ${written(inner)}`).join(', ')}}`;
+  return JSON.stringify(value);
+}
+
+/** Sets a member of the object at a path to JSON text; `''` as text removes it. */
+export function set_member(text, path, key, json) {
+  const object = node_at(parse(text), path);
+  const member = object.members.find(one => one.key === key);
+  if (json === '') return member ? without_member(text, object, key) : text;
+  return member ? replaced(text, member.value, json) : with_member(text, object, key, json);
+}
+
+const kMostRounds = 30;
+// Of the level that the stimulus has now: where to begin, not what is right.
+const kOfLevel = {min: 0.5, max: 2, start: 1.5, low: 0.5, high: 2, step: 0.1, turn: 0.05};
+const kLevels = {levels: [0.5, 0.7, 0.85, 1, 1.15, 1.3, 1.5], starts: [0.6, 1.4], steps: [0.4, 0.2, 0.1], threshold: [0.7, 0.85, 1, 1.15, 1.3], values: [0.7, 1, 1.3]};
+const round = number => Number(number.toPrecision(3));
+
+/** A value that follows from the level; undefined: none does. */
+function around_level(key, level) {
+  if (level === undefined || level === 0) return undefined;
+  if (key in kOfLevel) return round(kOfLevel[key] * level);
+  return kLevels[key]?.map(part => round(part * level));
+}
+
+/** Names that a new value may refer to: without one it would begin with a fault. */
+function initial_of(schema, key, context) {
+  const value = schema.initial(key);
+  if (context && key === 'stimuli' && Array.isArray(value)) return context.stimuli.slice(0, Math.max(1, value.length));
+  if (context && (key === 'standard' || key === 'absent')) return context.stimuli[0] ?? '';
+  if (context && around_level(key, context.level) !== undefined) return around_level(key, context.level);
+  if (key === 'guess') return 0.5;
+  if (key === 'level' && context?.levels.length) return {path: context.levels.find(path => /stiffness|radius|edge/.test(path)) ?? context.levels[0]};
+  return value;
+}
+
+/**
+ * Makes the object at a path consistent with its schema: removes members that do not belong to its decisions, adds
+ * those that they need. `before`: the members that were known before the decision; others stay, as faults.
+ */
+export function settle(text, schema_of, path, before, context) {
+  for (let round = 0; round < kMostRounds; ++round) {
+    const values = JSON.parse(text), root = schema_of(values.version);
+    const object = path.reduce((value, step) => value[step], values);
+    const {properties, required, choices} = schema_at(root, values, path).members(object);
+    const stray = Object.keys(object).find(key => before.has(key) && !properties.has(key));
+    if (stray !== undefined) {
+      text = set_member(text, path, stray, '');
+      continue;
+    }
+    const missing = [...required].find(key => !(key in object) && properties.has(key));
+    const choice = choices.find(list => list.length > 1 && list.filter(keys => keys.every(key => key in object)).length !== 1);
+    if (missing !== undefined) {
+      text = set_member(text, path, missing, written(initial_of(properties.get(missing), missing, context)));
+    } else if (choice) {
+      const held = choice.filter(keys => keys.every(key => key in object));
+      if (held.length > 1) text = set_member(text, path, held[1][0], '');
+      else {
+        const [key] = 'level' in object && choice.some(keys => keys[0] === 'procedure') ? ['procedure'] : choice.at(-1);
+        text = set_member(text, path, key, written(initial_of(properties.get(key), key, context)));
+      }
+    } else {
+      break;
+    }
+  }
+  return text;
+}
+
+/** Sets an enumerated member and lets the object follow. */
+export function decide(text, schema_of, path, key, json, context) {
+  const values = JSON.parse(text);
+  const object = path.reduce((value, step) => value[step], values);
+  const before = new Set(schema_at(schema_of(values.version), values, path).members(object).properties.keys());
+  // Keys stand for the answers of a task; without them they are 1, 2, ...
+  if (key === 'task') text = set_member(text, path, 'keys', '');
+  return settle(set_member(text, path, key, json), schema_of, path, before, context);
+}
+
+/** Adds a value to the list of the object at a path, and the list where there is none. */
+export function add_item(text, path, key, value) {
+  const object = node_at(parse(text), path), member = object.members.find(one => one.key === key);
+  return member ? with_item(text, member.value, written(value)) : with_member(text, object, key, `[${written(value)}]`);
+}

@@ -1,0 +1,200 @@
+// The form of a part of the protocol, made from the schema: members that are there as fields, the others in a menu.
+
+import {Context, title_of, value_control} from './controls.js';
+import {NotJson, has_duplicates, parse, pointer_of_path} from './json_text.js';
+import {element, by_id} from './dom.js';
+import {levels_of, names_of, renamed} from './references.js';
+import {schema_at} from './schema.js';
+import {hint_in_words} from './units.js';
+import {set_member, settle, written} from './decisions.js';
+
+const kFirst = ['name', 'title', 'description', 'shape', 'task', 'kind', 'file', 'radius_m', 'height_m', 'edge_m', 'size_m', 'scale', 'stimuli', 'standard', 'level', 'procedure'];
+const kLast = ['version', '$schema'];
+
+export class Form {
+  constructor(document, schema_of) {
+    this.document = document;
+    this.schema_of = schema_of;
+    this.faults = [];
+    this.quiet = false;
+    this.read();
+  }
+
+  /** Reads the text; false: a form cannot show it. `this.why` says why. */
+  read() {
+    this.why = '';
+    if (this.read_text === this.document.text) return !this.unreadable;
+    this.read_text = this.document.text;
+    this.unreadable = '';
+    try {
+      this.root = parse(this.document.text);
+      if (this.root.kind !== 'object') this.unreadable = 'It is no JSON object.';
+      else if (has_duplicates(this.root)) this.unreadable = 'A key is there twice.';
+      else if (this.document.bom) this.unreadable = 'It begins with a byte order mark.';
+      else if (/"__proto__"/.test(this.document.text)) this.unreadable = 'It has a key that no form shows.';
+      else this.values = JSON.parse(this.document.text);
+    } catch (error) {
+      if (!(error instanceof NotJson)) throw error;
+      const line = this.document.text.slice(0, error.at).split('\n').length;
+      this.unreadable = `Line ${line} is not JSON: ${error.message}.`;
+    }
+    return !this.unreadable;
+  }
+
+  get schema() {
+    return this.schema_of(this.values.version);
+  }
+
+  /** Changes one value; its control shows it already. */
+  edit(text, kind) {
+    this.quiet = true;
+    this.document.edit(text, kind);
+    this.quiet = false;
+  }
+  /** Changes more: the view is built again. `focus`: the path of the control that then has the focus; null: the same. */
+  rebuild(text, focus) {
+    this.focus = focus ? pointer_of_path(focus) : undefined;
+    this.document.edit(text);
+  }
+
+  rename(path, to) {
+    const from = path.reduce((value, step) => value[step], this.values);
+    if (to === from) return;
+    this.rebuild(renamed(this.document.text, path, to), undefined);
+  }
+
+  /** Names and numbers that new members of the object at a path may refer to. */
+  naming(path) {
+    const stimuli = names_of(this.values, 'stimuli');
+    const block = path[0] === 'blocks' ? this.values.blocks?.[path[1]] : undefined;
+    const name = block?.stimuli?.[0] ?? stimuli[0];
+    const stimulus = this.values.stimuli?.find(one => one?.name === name);
+    const merged = stimulus && {...this.values.material, ...stimulus};
+    const level = block?.level?.path?.split('/').slice(1).reduce((value, step) => value?.[step], merged);
+    return {stimuli, levels: stimulus ? levels_of(merged) : [], level: typeof level === 'number' ? level : undefined};
+  }
+
+  /** The key that says a number's unit: levels have that of the number that varies. */
+  unit_key(path, key) {
+    const block = path[0] === 'blocks' ? this.values.blocks?.[path[1]] : undefined;
+    const varied = block?.level?.path?.split('/').findLast(step => !/^\d+$/.test(step));
+    const of_level = ['levels', 'start', 'starts', 'min', 'max', 'steps', 'step', 'turn', 'low', 'high'];
+    if (!varied || !of_level.includes(key) || block.task === 'rate') return key;
+    const procedure = path.includes('procedure') ? path.slice(0, path.indexOf('procedure') + 1).concat(typeof path[path.indexOf('procedure') + 1] === 'number' ? [path[path.indexOf('procedure') + 1]] : []) : null;
+    const scale = procedure?.reduce((value, step) => value?.[step], this.values)?.scale;
+    const is_ratio = scale && scale !== 'linear' && ['steps', 'step'].includes(key);
+    return is_ratio ? key : varied;
+  }
+
+  /** The fields of the object at a path. `only`: of these members. */
+  members(context, path, schema, only) {
+    const value = context.value(path), {properties, required, open} = schema.members(value);
+    const mine = key => !only || only.includes(key);
+    const order = [...properties.keys()].sort((a, b) => (rank(a) === rank(b) ? 0 : rank(a) - rank(b)));
+    const there = [...order.filter(key => key in value), ...Object.keys(value).filter(key => !properties.has(key))].filter(mine);
+    const missing = order.filter(key => required.has(key) && !(key in value) && mine(key));
+    const rest = order.filter(key => !(key in value) && !required.has(key) && mine(key));
+    const own = {class: path.length ? 'members' : 'members top', 'data-members': pointer_of_path(path)};
+    return element(path.length ? 'fieldset' : 'div', own,
+        path.length ? element('legend', {class: 'hidden', text: title_of(path.at(-1))}) : null,
+        ...there.map(key => this.#row(context, path, key, properties.get(key) ?? open, required.has(key), properties.has(key) || Boolean(open))),
+        ...missing.map(key => this.#missing(context, path, key, properties.get(key))),
+        rest.length ? this.#more(context, path, rest, properties) : null);
+  }
+
+  #row(context, path, key, schema, is_required, belongs) {
+    const at = [...path, key], pointer = pointer_of_path(at);
+    const known = schema ?? this.schema.of({});
+    const control = value_control(context, at, known);
+    const inner = control.matches('fieldset, .list') || control.querySelector('fieldset, .list') !== null;
+    const label = element('label', {class: 'name', for: `field${pointer}`, text: title_of(key)});
+    const remove = is_required ? null : element('button', {type: 'button', class: 'remove', title: `Remove ${title_of(key)}`, 'aria-label': `Remove ${title_of(key)}`,
+      'data-pointer': `${pointer}#remove`, text: '\u00d7', onclick: () => this.rebuild(set_member(this.document.text, path, key, ''), null)});
+    const words = belongs ? hint_in_words(key, known.resolved().json.description ?? '') : 'This key is unknown here.';
+    const hint = words ? element('span', {class: belongs ? 'hint' : 'hint alarm', id: `hint${pointer}`, text: words}) : null;
+    if (hint) control.querySelector?.('input, select, textarea')?.setAttribute('aria-describedby', hint.id);
+    return element('div', {class: inner ? 'row wide' : 'row', 'data-row': pointer}, label, control, remove, hint, element('span', {class: 'fault', id: `fault${pointer}`, hidden: true}));
+  }
+
+  #missing(context, path, key, schema) {
+    const pointer = pointer_of_path([...path, key]);
+    return element('div', {class: 'row', 'data-row': pointer}, element('span', {class: 'name', text: title_of(key)}),
+        element('button', {type: 'button', text: `Set ${title_of(key).toLowerCase()}`, 'data-pointer': pointer, onclick: () => this.#set(path, key, schema)}),
+        element('span', {class: 'fault', id: `fault${pointer}`, hidden: true}));
+  }
+
+  #more(context, path, keys, properties) {
+    const pointer = `${pointer_of_path(path)}#more`;
+    const select = element('select', {class: 'more', 'aria-label': path.length ? `Set something else of ${title_of(path.at(-1))}` : 'Set something else', 'data-pointer': pointer,
+      onchange: () => select.selectedIndex > 0 && this.#set(path, keys[select.selectedIndex - 1], properties.get(keys[select.selectedIndex - 1]))},
+    element('option', {text: 'Set something else \u2026'}),
+    ...keys.map(key => {
+      const words = hint_in_words(key, properties.get(key).resolved().json.description ?? '');
+      return element('option', {text: words ? `${title_of(key)}: ${words.length > 90 ? `${words.slice(0, 88)}\u2026` : words}` : title_of(key)});
+    }));
+    return element('div', {class: 'row'}, select);
+  }
+
+  #set(path, key, schema) {
+    const naming = this.naming(path), draft = set_member(this.document.text, path, key, written(schema.initial(key)));
+    this.rebuild(settle(draft, this.schema_of, path, new Set(), naming), [...path, key]);
+  }
+
+  /** A context of the text as it is now. */
+  context() {
+    return new Context(this);
+  }
+  schema_at(path) {
+    return schema_at(this.schema, this.values, path);
+  }
+
+  /** Marks the fields of faults within an element. */
+  mark(root, faults) {
+    for (const old of root.querySelectorAll('[aria-invalid]')) old.removeAttribute('aria-invalid');
+    for (const old of root.querySelectorAll('.fault')) {
+      old.hidden = true;
+      old.textContent = '';
+    }
+    for (const fault of faults) {
+      const row = row_of(root, fault.pointer);
+      const place = row?.querySelector(':scope > .fault');
+      if (!place) continue;
+      place.textContent += (place.textContent ? ' ' : '') + fault.text;
+      place.hidden = false;
+      const control = row.querySelector('input, select, textarea, button');
+      control?.setAttribute('aria-invalid', 'true');
+      control?.setAttribute('aria-describedby', place.id);
+    }
+  }
+}
+
+/** The innermost row of a pointer within an element. */
+export function row_of(root, pointer) {
+  for (let at = pointer; at !== ''; at = at.slice(0, Math.max(0, at.lastIndexOf('/')))) {
+    const row = root.querySelector(`[data-row="${CSS.escape(at)}"]`);
+    if (row) return row;
+  }
+  return null;
+}
+
+function rank(key) {
+  const at = kFirst.indexOf(key);
+  return kLast.includes(key) ? Infinity : at < 0 ? kFirst.length : at;
+}
+
+/** Restores the focus after a view was built again. */
+export function with_focus_kept(root, wanted, build) {
+  const active = document.activeElement;
+  const pointer = wanted ?? (root.contains(active) ? active.dataset.pointer : undefined);
+  const caret = active?.selectionStart !== undefined && !wanted ? [active.selectionStart, active.selectionEnd] : null;
+  build();
+  if (pointer === undefined) return;
+  const found = root.querySelector(`[data-pointer="${CSS.escape(pointer)}"]`) ?? row_of(root, pointer.split('#')[0]) ?? root;
+  const target = found.matches('input, select, textarea, button') ? found : found.querySelector('input, select, textarea, button') ?? by_id('view');
+  target.focus();
+  try {
+    if (caret && target.setSelectionRange) target.setSelectionRange(...caret);
+  } catch {
+    // A checkbox has no caret.
+  }
+}
