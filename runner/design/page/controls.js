@@ -156,8 +156,14 @@ function json_control(context, path) {
 function list_control(context, path, items) {
   const value = context.value(path);
   const list = () => node_at(parse(context.text), path);
+  const labelled = i => {
+    const control = value_control(context, [...path, i], items);
+    const input = control.matches('input, textarea, select') ? control : control.matches('.with-unit') ? control.firstChild : null;
+    input?.setAttribute('aria-label', `${title_of(path.at(-1))} ${i + 1}`);
+    return control;
+  };
   return element('div', {class: 'list', ...known(path)}, ...value.map((_, i) => element('div', {class: 'entry'},
-      value_control(context, [...path, i], items),
+      labelled(i),
       element('span', {class: 'tools'},
           i > 0 ? element('button', {type: 'button', 'aria-label': `Move ${title_of(path.at(-1))} ${i + 1} up`, text: '\u2191', 'data-pointer': `${pointer_of_path(path)}#up${i}`,
             onclick: () => context.rebuild(with_exchanged(context.text, list(), i - 1, i), null)}) : null,

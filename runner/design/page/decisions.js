@@ -73,6 +73,15 @@ export function settle(text, schema_of, path, before, context) {
       break;
     }
   }
+  return settle_within(text, schema_of, path, before, context);
+}
+
+/** The same of objects that the object holds, after a decision about it. */
+function settle_within(text, schema_of, path, before, context) {
+  if (before.size === 0) return text;
+  const object = path.reduce((value, step) => value[step], JSON.parse(text));
+  for (const [key, value] of Object.entries(object))
+    if (type_of(value) === 'object' && key !== 'keys') text = settle(text, schema_of, [...path, key], new Set(Object.keys(value)), context);
   return text;
 }
 

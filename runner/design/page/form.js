@@ -159,8 +159,11 @@ export class Form {
       const row = row_of(root, fault.pointer);
       const place = row?.querySelector(':scope > .fault');
       if (!place) continue;
-      place.textContent += (place.textContent ? ' ' : '') + fault.text;
+      const is_own = row.dataset.row === fault.pointer;
+      const member = fault.pointer.slice(row.dataset.row.length + 1);
+      place.textContent += (place.textContent ? ' ' : '') + (is_own ? fault.text : `${title_of(member)}: ${fault.text}`);
       place.hidden = false;
+      if (!is_own) continue;
       const control = row.querySelector('input, select, textarea, button');
       control?.setAttribute('aria-invalid', 'true');
       control?.setAttribute('aria-describedby', place.id);

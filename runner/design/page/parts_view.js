@@ -1,6 +1,7 @@
 // The parts of a protocol in the outline: fields of the whole, and lists of stimuli, blocks, pages, one entry at a time.
 
 import {element} from './dom.js';
+import {value_control} from './controls.js';
 import {free_name} from './references.js';
 import {node_at, parse, pointer_of_path, with_exchanged, with_item, without_item} from './json_text.js';
 import {add_item, settle, written} from './decisions.js';
@@ -26,6 +27,8 @@ export function part_of(pointer) {
   return (kParts.find(part => part.list === key || part.keys.includes(key)) ?? kParts[0]).name;
 }
 
+const fault_place = () => element('p', {class: 'fault', hidden: true});
+
 export class PartView {
   constructor(form, part) {
     Object.assign(this, {form, part, shown: 0});
@@ -46,6 +49,15 @@ export class PartView {
   }
 
   #build() {
+    try {
+      this.#fill();
+    } catch (error) {
+      console.error(error);
+      this.root.replaceChildren(element('div', {class: 'card'}, element('h3', {text: this.part.title}),
+          element('p', {text: `No form can show this: ${error.message}. The file shows it.`})));
+    }
+  }
+  #fill() {
     const {form, part} = this;
     if (!form.read()) {
       this.root.replaceChildren(element('div', {class: 'card'}, element('h3', {text: part.title}),
@@ -75,7 +87,7 @@ export class PartView {
     const tabs = entries.map((entry, i) => element('button', {type: 'button', class: 'tab', 'aria-pressed': i === this.shown ? 'true' : 'false', 'data-index': String(i),
       'data-pointer': `${pointer_of_path(path)}#tab${i}`, text: entry?.name || `${part.one} ${i + 1}`, onclick: () => this.go_to(i)}));
     const add = element('button', {type: 'button', text: `Add a ${part.one}`, 'data-pointer': `${pointer_of_path(path)}#add`, onclick: () => this.#add()});
-    return element('div', {}, element('div', {class: 'tabs', role: 'group', 'aria-label': part.title}, ...tabs, add),
+    return element('div', {'data-row': pointer_of_path(path)}, element('div', {class: 'tabs', role: 'group', 'aria-label': part.title}, ...tabs, add), fault_place(),
         entries.length ? this.#entry(context, [part.list, this.shown], entries) : null);
   }
 
@@ -83,10 +95,10 @@ export class PartView {
     const i = path[1], name = entries[i]?.name || `${this.part.one} ${i + 1}`;
     const button = (text, label, what, disabled) => element('button', {type: 'button', text, 'aria-label': label, 'data-pointer': `${pointer_of_path(path)}#${what}`,
       disabled, onclick: () => this.#change(what)});
-    return element('div', {class: 'card'}, element('div', {class: 'bar'}, element('h3', {text: name}), element('span', {class: 'space'}),
+    return element('div', {class: 'card', 'data-row': pointer_of_path(path)}, element('div', {class: 'bar'}, element('h3', {text: name}), element('span', {class: 'space'}),
         button('\u2191', `Move ${name} to the front`, 'up', i === 0), button('\u2193', `Move ${name} to the back`, 'down', i === entries.length - 1),
-        button('Copy', `Copy ${name}`, 'copy'), button('Remove', `Remove ${name}`, 'remove')),
-    this.form.members(context, path, this.form.schema_at(path)));
+        button('Copy', `Copy ${name}`, 'copy'), button('Remove', `Remove ${name}`, 'remove')), fault_place(),
+    value_control(context, path, this.form.schema_at(path)));
   }
 
   go_to(index) {
