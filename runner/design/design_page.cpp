@@ -11,6 +11,7 @@
 #include "data/base/text.h"
 #include "protocols/parse.h"
 #include "runner/design/answers.h"
+#include "runner/design/beside.h"
 #include "runner/design/page_assets.h"
 #include "runner/serve/loopback.h"
 #include "runner/usage_error.h"
@@ -69,6 +70,11 @@ Json opened(const ProtocolFile& file) {
   return out;
 }
 
+Json translation_of(const ProtocolFile& file, const std::string& language) {
+  const std::optional<FileState> found = read_state(translation_path(file, language));
+  return {{"text", found ? found->text : ""}, {"sha256", found ? found->sha256 : ""}};
+}
+
 }  // namespace
 
 std::string_view text_of_asset(std::span<const Asset> assets, std::string_view name) {
@@ -79,7 +85,7 @@ std::string_view text_of_asset(std::span<const Asset> assets, std::string_view n
 }
 
 DesignPage::DesignPage(const ProtocolFile& file, const TemporaryFolder& folder)
-    : file_(file), rehearsal_(folder) {}
+    : file_(file), folder_(folder), rehearsal_(folder) {}
 
 bool DesignPage::is_slow(const std::string& target) {
   return target == "/check" || target == "/picture" || target == "/schedule";
@@ -133,6 +139,12 @@ PageAnswer DesignPage::post(const std::string& target, const std::string& body) 
 Json DesignPage::answer(const std::string& message, const nlohmann::json& values) {
   if (message == "open") return opened(file_);
   if (message == "progress") return rehearsal_.progress();
+  if (message == "mesh") {
+    const std::optional<std::string> bytes = base64_decoded(text_in(values, "bytes"));
+    if (!bytes) throw UsageError("bytes: expected base64");
+    return add_mesh(file_, folder_.path(), text_in(values, "name"), *bytes);
+  }
+  if (message == "translation") return translation_of(file_, text_in(values, "language"));
   if (message == "stop") {
     rehearsal_.stop();
     return rehearsal_.progress();
@@ -149,6 +161,13 @@ Json DesignPage::answer(const std::string& message, const nlohmann::json& values
          .seed = static_cast<std::uint64_t>(number_in(values, "seed", 1, kMostNumber))});
     return rehearsal_.progress();
   }
+  if (message == "texts") return texts_answer(text, file_);
+  if (message == "check_translation")
+    return check_translation(text, file_, text_in(values, "language"),
+                             text_in(values, "translation"));
+  if (message == "save_translation")
+    return {{"sha256", save_state(translation_path(file_, text_in(values, "language")), text,
+                                  text_in(values, "sha256"))}};
   if (message == "save") return {{"sha256", file_.save(text, text_in(values, "sha256"))}};
   if (message == "copy") return {{"name", file_.save_copy(text)}};
   return nullptr;

@@ -7,8 +7,12 @@
 //   picture {text}, schedule {text, participant}
 //   rehearse {text, participants, seed}, progress {}, stop {}
 //   save {text, sha256}, copy {text}
+//   mesh {name, bytes: base64}             a file beside the protocol
+//   texts {text}, translation {language}, check_translation {text, language, translation},
+//   save_translation {language, text, sha256}
 //
-// An answer with status 409 has "error", a sentence; of save also "found", the file as it is now.
+// An answer with status 409 has "error", a sentence; of save and
+// save_translation also "found", the file as it is now.
 
 #include <string>
 
@@ -37,6 +41,7 @@ class DesignPage {
   nlohmann::ordered_json answer(const std::string& message, const nlohmann::json& values);
 
   const ProtocolFile& file_;
+  const TemporaryFolder& folder_;
   Rehearsal rehearsal_;
 };
 

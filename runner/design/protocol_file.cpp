@@ -87,28 +87,39 @@ std::string ProtocolFile::folder() const {
   return folder.empty() ? "." : folder;
 }
 
-std::optional<FileState> ProtocolFile::read() const {
+std::optional<FileState> ProtocolFile::read() const { return read_state(path_); }
+
+std::string ProtocolFile::save(const std::string& text, const std::string& opened) const {
+  return save_state(path_, text, opened);
+}
+
+std::string ProtocolFile::save_copy(const std::string& text) const {
+  return save_beside(path_, text);
+}
+
+std::optional<FileState> read_state(const std::string& path) {
   std::error_code none;
-  if (!fs::exists(fs::symlink_status(path_, none))) return std::nullopt;
+  if (!fs::exists(fs::symlink_status(path, none))) return std::nullopt;
   FileState out;
-  out.text = protocols::read_text_file(path_);
+  out.text = protocols::read_text_file(path);
   if (!is_utf8(out.text))
-    throw UsageError(printable(path_) + ": is not UTF-8; convert it, for example with iconv");
+    throw UsageError(printable(path) + ": is not UTF-8; convert it, for example with iconv");
   out.sha256 = checksum_hex(out.text);
   return out;
 }
 
-std::string ProtocolFile::save(const std::string& text, const std::string& opened) const {
+std::string save_state(const std::string& path, const std::string& text,
+                       const std::string& opened) {
   try {
-    const std::optional<FileState> found = read();
+    const std::optional<FileState> found = read_state(path);
     if (found && found->sha256 != opened)
       throw NotSaved(opened.empty() ? "Another program has made this file meanwhile."
                                     : "Another program has changed this file meanwhile.",
                      found);
     if (!found && !opened.empty())
       throw NotSaved("The file was removed or renamed meanwhile.", FileState{});
-    if (const std::string why = protection_of(path_); !why.empty()) throw NotSaved(why);
-    write_atomically(path_, text, found.has_value());
+    if (const std::string why = protection_of(path); !why.empty()) throw NotSaved(why);
+    write_atomically(path, text, found.has_value());
   } catch (const data::StoreError& error) {
     throw NotSaved(error.what());
   } catch (const protocols::InputError& error) {
@@ -119,22 +130,24 @@ std::string ProtocolFile::save(const std::string& text, const std::string& opene
   return checksum_hex(text);
 }
 
-std::string ProtocolFile::save_copy(const std::string& text) const {
+std::string save_beside(const std::string& path, const std::string& bytes) {
   try {
-    const std::string path = free_name(path_);
-    write_atomically(path, text, false);
-    return fs::path(path).filename().string();
+    const std::string chosen = free_name(path);
+    write_atomically(chosen, bytes, false);
+    return fs::path(chosen).filename().string();
   } catch (const data::StoreError& error) {
     throw NotSaved(error.what());
   }
 }
 
 std::string free_name(const std::string& path) {
-  const std::string stem = path.substr(0, path.size() - std::string(".json").size());
+  const fs::path given(path);
+  const std::string stem = (given.parent_path() / given.stem()).string();
+  const std::string end = given.extension().string();
   std::string name = path;
   std::error_code none;
   for (int n = 2; fs::exists(fs::symlink_status(name, none)); ++n)
-    name = stem + "-" + std::to_string(n) + ".json";
+    name = stem + "-" + std::to_string(n) + end;
   return name;
 }
 

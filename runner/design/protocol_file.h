@@ -47,6 +47,14 @@ class ProtocolFile {
   std::string path_;
 };
 
+/// The content of a file; nullopt: there is none. \throws as ProtocolFile::read
+std::optional<FileState> read_state(const std::string& path);
+/// As ProtocolFile::save, of any file.
+std::string save_state(const std::string& path, const std::string& text, const std::string& opened);
+/// Writes a new file: that of the path, or "part-2.stl" where it exists. \return its name.
+/// \throws NotSaved
+std::string save_beside(const std::string& path, const std::string& bytes);
+
 /// "study.json", or the first of "study-2.json", ... that does not exist.
 std::string free_name(const std::string& path);
 

@@ -3,7 +3,7 @@
 Usage: make_images.py PALPATE [NAME ...]    all pictures, or those of these names
        make_images.py --list                their names
 
-Needs Xvfb, xdotool and ImageMagick, and for live-session a machine that is not busy. The figures are those of the
+Needs Xvfb, xdotool and ImageMagick, for design Chromium, and for live-session a machine that is not busy. The figures are those of the
 study that runner/quickstart.sh simulates: the same ones wherever they are made.
 """
 
@@ -22,6 +22,7 @@ ROOT = pathlib.Path(__file__).resolve().parent.parent.parent
 IMAGES = ROOT / ".github" / "images"
 PROTOCOLS = ROOT / "protocols"
 sys.path.insert(0, str(ROOT / "tests" / "runner" / "display"))
+sys.path.insert(0, str(ROOT / "tests" / "analysis" / "report"))
 
 from contact_patches import contact_patches  # noqa: E402
 from virtual_screen import VirtualScreen, wait_for  # noqa: E402
@@ -245,9 +246,30 @@ def explore_window(palpate, folder):
         screen.close()
 
 
+def design(palpate, folder):
+    """The page of palpate design on the cone of the paper's study."""
+    from report_chromium import Browser, find  # only this picture needs a browser
+    shutil.copy(PROTOCOLS / "ho2000.json", folder)
+    program = subprocess.Popen([palpate, "design", folder / "ho2000.json", "--no-browser"], stdout=subprocess.PIPE,
+                               stderr=subprocess.DEVNULL, text=True)
+    browser = Browser(find(), loopback=True)
+    try:
+        browser.window(1280, 800)
+        browser.open_url(program.stdout.readline().strip())
+        wait_for("the check", lambda: browser.run("window.design !== undefined && design.checks.is_settled"))
+        browser.run("design.views.get('stimuli').view.go_to(1)")
+        time.sleep(0.5)  # drawn
+        (folder / "page.png").write_bytes(browser.screenshot(whole=False))
+        subprocess.run(["convert", folder / "page.png", "+dither", "-colors", "255", "-strip", f"PNG8:{IMAGES / 'design.png'}"], check=True)
+    finally:
+        browser.close()
+        program.kill()
+        program.wait()
+
+
 SCENES = ["fig3b-extended-probe", "fig13-two-objects", "fig14-dumbbells", "fig16-rocket", "fig17a-engine", "fig17b-instrument", "layers"]
 STUDIES = {"force-field": "reach2", "grating-roughness": "magnitude1", "spacing-2afc": "function1", "tap-hardness": "function1"}
-PICTURES = {**{name: scene(name) for name in SCENES}, **{name: study_figure(name, figure) for name, figure in STUDIES.items()},
+PICTURES = {"design": design, **{name: scene(name) for name in SCENES}, **{name: study_figure(name, figure) for name, figure in STUDIES.items()},
             "contact-patches": lambda palpate, folder: (IMAGES / "contact-patches.svg").write_text(contact_patches()),
             "explore-window": explore_window, "live-session": lambda *arguments: undisturbed(live_session, *arguments), "figure15": figure("figure15"),
             "speedup": figure("speedup"), "power": power, "group": group, "cues-pse": cues_pse, "sweep-gains": sweep_gains, "soft-stability": soft_stability,

@@ -8,6 +8,7 @@ import {PartView, kParts, part_of} from './parts_view.js';
 import {PictureView} from './picture_view.js';
 import {RehearseView} from './rehearse_view.js';
 import {TextView} from './text_view.js';
+import {TranslationView} from './translation_view.js';
 import {ask, on_connection} from './server.js';
 import {by_id, element} from './dom.js';
 import {choose_template} from './start_view.js';
@@ -28,6 +29,7 @@ class Page {
       ...kParts.map(part => [part.name, {title: part.title, part, view: new PartView(this.form, part)}]),
       ['text', {title: 'The file', view: new TextView(this.document)}],
       ['order', {title: 'Order of a participant', view: new OrderView(this.document)}],
+      ['translations', {title: 'Translations', view: new TranslationView(this.document)}],
       ['rehearse', {title: 'Rehearse', view: new RehearseView(this.document)}],
     ]);
     this.picture = new PictureView();

@@ -5,6 +5,7 @@ import {value_control} from './controls.js';
 import {free_name} from './references.js';
 import {node_at, parse, pointer_of_path, with_exchanged, with_item, without_item} from './json_text.js';
 import {add_item, settle, written} from './decisions.js';
+import {mesh_place} from './mesh_file.js';
 import {with_focus_kept} from './form.js';
 
 // What stands in the outline: members of the protocol, and a list among them that is shown one entry at a time.
@@ -33,6 +34,7 @@ export class PartView {
   constructor(form, part) {
     Object.assign(this, {form, part, shown: 0});
     this.root = element('div', {class: 'form'});
+    this.mesh = part.list === 'stimuli' ? mesh_place(form, index => this.shown = index) : null;
     this.faults = [];
   }
 
@@ -87,8 +89,8 @@ export class PartView {
     const tabs = entries.map((entry, i) => element('button', {type: 'button', class: 'tab', 'aria-pressed': i === this.shown ? 'true' : 'false', 'data-index': String(i),
       'data-pointer': `${pointer_of_path(path)}#tab${i}`, text: entry?.name || `${part.one} ${i + 1}`, onclick: () => this.go_to(i)}));
     const add = element('button', {type: 'button', text: `Add a ${part.one}`, 'data-pointer': `${pointer_of_path(path)}#add`, onclick: () => this.#add()});
-    return element('div', {'data-row': pointer_of_path(path)}, element('div', {class: 'tabs', role: 'group', 'aria-label': part.title}, ...tabs, add), fault_place(),
-        entries.length ? this.#entry(context, [part.list, this.shown], entries) : null);
+    return element('div', {class: 'entries', 'data-row': pointer_of_path(path)}, element('div', {class: 'tabs', role: 'group', 'aria-label': part.title}, ...tabs, add), this.mesh?.place ?? null, fault_place(),
+        entries.length ? this.#entry(context, [part.list, this.shown], entries) : '');
   }
 
   #entry(context, path, entries) {

@@ -15,7 +15,7 @@ import unittest
 sys.dont_write_bytecode = True
 from browser_case import PROTOCOLS, BrowserCase, skip_without_browser  # noqa: E402
 from design_case import PALPATE, PATIENCE  # noqa: E402
-from design_http_test import PROTOCOL_FILES  # noqa: E402
+from design_http_test import PROTOCOL_FILES, cube_stl  # noqa: E402
 
 TESTS = pathlib.Path(__file__).resolve().parents[2]
 PARTS = ["study", "stimuli", "blocks", "groups", "answers", "pages", "texts", "space"]
@@ -396,6 +396,56 @@ class Faults(FormCase):
             for part in PARTS:
                 self.show(part)
             self.assertEqual(self.complaints(), [], text)
+
+
+class Beside(FormCase):
+    def test_a_dropped_mesh_becomes_a_stimulus(self):
+        self.page(self.copy("ho2000.json"))
+        before = self.text()
+        self.show("stimuli", 0)
+        content = cube_stl(40).decode()
+        self.js(f"""(() => {{
+          const data = new DataTransfer();
+          data.items.add(new File([{json.dumps(content)}], 'bracket.stl'));
+          document.querySelector('.drop').dispatchEvent(new DragEvent('drop', {{dataTransfer: data, bubbles: true, cancelable: true}}));
+        }})()""")
+        self.wait_for("design.document.text.includes('bracket.stl')")
+        self.settle()
+        self.assertEqual(json.loads(self.text())["stimuli"][4], {"name": "bracket", "shape": "mesh", "file": "bracket.stl", "scale": 0.001})
+        self.assertEqual(self.js("document.activeElement.value"), "bracket")
+        self.assertIn("40 x 40 x 40 mm", self.js("document.querySelector('.drop [role=status]').textContent"))
+        self.key("z", "Control")
+        self.settle()
+        self.js("design.document.undo()") if self.text() != before else None
+        self.assertEqual(self.text(), before)
+
+    def test_a_bad_mesh_says_why(self):
+        self.page(self.copy("ho2000.json"))
+        before = self.text()
+        self.show("stimuli", 0)
+        self.js("design.views.get('stimuli').view.mesh.take(new File(['no mesh'], 'x.stl'))")
+        self.wait_for("document.querySelector('.drop [role=status]').textContent.includes('x.stl')")
+        self.wait_for("!document.querySelector('.drop [role=status]').textContent.includes('is read')")
+        self.assertEqual(self.text(), before)
+        self.assertEqual(list(self.dir.glob("*.stl")), [])
+
+    def test_a_translation_is_written_beside_its_original(self):
+        path = self.copy("quick.json")
+        self.page(path)
+        self.show("translations")
+        self.wait_for("design.views.get('translations').view.texts.length > 3")
+        self.js("(c => (c.value = 'de', c.dispatchEvent(new Event('change'))))(document.querySelector('main input'))")
+        self.wait_for("document.querySelectorAll('.pair').length > 3")
+        count = self.js("document.querySelectorAll('.pair').length")
+        self.assertIn(f"0 of {count} translated", self.js("document.querySelector('main [role=status]').textContent"))
+        for i in range(count):
+            self.js(f"document.querySelectorAll('.pair textarea')[{i}].focus()")
+            self.type(f"Wörter {i}")
+        self.js("[...document.querySelectorAll('main button')].find(b => b.textContent === 'Save translation').click()")
+        self.wait_for("document.querySelector('main [role=status]').textContent.endsWith('; saved')")
+        done = subprocess.run([PALPATE, "validate", path, "--language", "de"], capture_output=True, text=True, timeout=PATIENCE)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(path.read_bytes(), (PROTOCOLS / "quick.json").read_bytes())
 
 
 class People(FormCase):

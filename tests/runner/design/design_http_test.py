@@ -3,6 +3,7 @@
 Usage: design_http_test.py PALPATE PROTOCOLS
 """
 
+import base64
 import hashlib
 import json
 import os
@@ -253,6 +254,86 @@ class Files(DesignCase):
             done = subprocess.run([PALPATE, "design", path, "--no-browser"], capture_output=True, text=True, timeout=PATIENCE)
             self.assertEqual(done.returncode, 2, name)
             self.assertIn(path.name, done.stderr)
+
+
+def cube_stl(edge):
+    """A closed cube as ASCII STL."""
+    corners = [(x * edge, y * edge, z * edge) for z in (0, 1) for y in (0, 1) for x in (0, 1)]
+    quads = ((0, 2, 3, 1), (4, 5, 7, 6), (0, 1, 5, 4), (2, 6, 7, 3), (0, 4, 6, 2), (1, 3, 7, 5))
+    facets = [t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]
+    lines = ["solid cube"]
+    for facet in facets:
+        lines += ["facet normal 0 0 0", "outer loop", *("vertex %g %g %g" % corners[i] for i in facet), "endloop", "endfacet"]
+    return "\n".join(lines + ["endsolid cube", ""]).encode()
+
+
+class Beside(DesignCase):
+    def mesh(self, name, content, status=200):
+        return self.ask("mesh", status, name=name, bytes=base64.b64encode(content).decode())
+
+    def test_meshes_are_copied_with_a_proposed_scale(self):
+        self.design(self.copy("quick.json"))
+        for edge, scale in ((0.05, 1), (50, 0.001), (2, 0.0254), (120000, 1e-7)):
+            said = self.mesh("Part one.stl", cube_stl(edge))
+            self.assertEqual(said["scale"], scale, edge)
+            self.assertTrue(0.005 <= said["size_m"][0] <= 0.3, said)
+            self.assertEqual((self.dir / said["file"]).read_bytes(), cube_stl(edge))
+        self.assertEqual(sorted(one.name for one in self.dir.glob("*.stl")),
+                         ["Part-one-2.stl", "Part-one-3.stl", "Part-one-4.stl", "Part-one.stl"])
+        text = json.loads((self.dir / "p.json").read_text())
+        text["stimuli"][0] = {"name": "sphere", "shape": "mesh", "file": "Part-one-2.stl", "scale": 0.001}
+        self.assertEqual(self.ask("check", text=json.dumps(text))["faults"], [])
+        picture = self.ask("picture", text=json.dumps(text))["stimuli"][0]
+        self.assertAlmostEqual(picture["size_m"][0], 0.05, places=6)
+
+    def test_no_path_of_a_mesh_leads_elsewhere(self):
+        self.design(self.copy("quick.json"))
+        for name, kept in (("../../up.stl", "up.stl"), ("C:\\dir\\win.stl", "win.stl"), ("/etc/abs.stl", "abs.stl"), ("..hidden.stl", "hidden.stl"),
+                           ("a\nb;rm.stl", "a-b-rm.stl"), ("p" * 300 + ".stl", "p" * 96 + ".stl")):
+            self.assertEqual(self.mesh(name, cube_stl(0.05))["file"], kept)
+            self.assertTrue((self.dir / kept).is_file())
+        self.assertFalse((self.dir.parent / "up.stl").exists())
+
+    def test_what_is_no_mesh_is_not_written(self):
+        self.design(self.copy("quick.json"))
+        open_box = b"\n".join(cube_stl(0.05).split(b"\n")[:-9]) + b"\nendsolid cube\n"
+        for name, content in (("x.stl", b"not a mesh"), ("x.stl", b""), ("x.json", b"{}"), ("x.sh", b"#!"), ("x.stl", open_box), ("x.gltf", b"{}"), (".stl", b"x")):
+            self.assertTrue(self.mesh(name, content, 409)["error"], name)
+        self.assertIn("base64", self.ask("mesh", 409, name="x.stl", bytes="*")["error"])
+        self.assertEqual(sorted(one.name for one in self.dir.iterdir()), ["p.json", "temporary"])
+        self.assertEqual([one for one in self.temporary.rglob("*") if one.is_file() and not one.name.startswith("x")], [])
+
+    def test_translations_are_files_of_their_own(self):
+        path = self.copy("roughness-magnitude.json", "rough.json")
+        shutil.copy(PROTOCOLS / "roughness-magnitude.texts.de.json", self.dir / "rough.texts.de.json")
+        (self.dir / "rough.texts.not a language.json").write_text("{}")
+        self.design(path)
+        text = path.read_text(encoding="utf-8")
+        said = self.ask("texts", text=text)
+        self.assertEqual(said["languages"], ["de"])
+        listed = subprocess.run([PALPATE, "validate", "--texts", path], capture_output=True, text=True, timeout=PATIENCE, check=True)
+        self.assertEqual(dict(said["texts"]), json.loads(listed.stdout))
+        german = self.ask("translation", language="de")
+        self.assertEqual(german["text"], (self.dir / "rough.texts.de.json").read_text(encoding="utf-8"))
+        self.assertEqual(self.ask("check_translation", text=text, language="de", translation=german["text"])["faults"], [])
+        less = json.loads(german["text"])
+        key = next(iter(less))
+        del less[key]
+        faults = self.ask("check_translation", text=text, language="de", translation=json.dumps(less))["faults"]
+        self.assertEqual([one["pointer"] for one in faults], [f"/{key}"])
+        self.assertEqual(self.ask("translation", language="pt-BR"), {"text": "", "sha256": ""})
+        self.ask("save_translation", language="pt-BR", text="{}", sha256="")
+        self.assertEqual((self.dir / "rough.texts.pt-BR.json").read_text(), "{}")
+        refused = self.ask("save_translation", 409, language="pt-BR", text="{ }", sha256="")
+        self.assertEqual(refused["found"]["text"], "{}")
+        self.assertEqual(path.read_text(encoding="utf-8"), text)
+
+    def test_a_language_is_no_path(self):
+        self.design(self.copy("quick.json"))
+        for language in ("", "d", "../../x", "de/x", "de.json", "deutsch", "de-", "a" * 30):
+            self.ask("translation", 409, language=language)
+            self.ask("save_translation", 409, language=language, text="{}", sha256="")
+        self.assertEqual(sorted(one.name for one in self.dir.iterdir()), ["p.json", "temporary"])
 
 
 class Rehearsals(DesignCase):

@@ -1,0 +1,35 @@
+#pragma once
+// Files beside a protocol that its page may write: meshes that were dropped on it, and translations
+// of what the participant reads.
+
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+
+#include "runner/design/protocol_file.h"
+
+namespace palpate::runner::design {
+
+/// Copies a mesh beside the protocol, under its own name or a free one like it.
+/// \param name  as the user's computer calls it. \param folder  for a draft: nothing is written
+/// beside the protocol unless palpate can read it. \return {"file", "scale": proposed, "size_m": at
+/// that scale, "notes"}. \throws UsageError, stimuli::MeshError, protocols::InputError, NotSaved
+nlohmann::ordered_json add_mesh(const ProtocolFile& file, const std::string& folder,
+                                const std::string& name, const std::string& bytes);
+
+/// Multiplies coordinates of this largest extent so that a hand can hold the object: 1 for metres,
+/// 0.001 for millimetres, 0.0254 for inches. \param largest  in the file's unit
+double proposed_scale(double largest);
+
+/// {"texts": [[key, original], ...], "languages": of the translations that are there}
+nlohmann::ordered_json texts_answer(const std::string& text, const ProtocolFile& file);
+
+/// "NAME.texts.LANGUAGE.json" beside the protocol. \throws UsageError: "de", "pt-BR" are languages
+std::string translation_path(const ProtocolFile& file, const std::string& language);
+
+/// The faults of a translation, as of a protocol.
+nlohmann::ordered_json check_translation(const std::string& text, const ProtocolFile& file,
+                                         const std::string& language,
+                                         const std::string& translation);
+
+}  // namespace palpate::runner::design
