@@ -18,6 +18,7 @@ SCENES = sorted(path.stem for path in (SOURCE / "protocols/scenes").glob("*.csv"
 MESHES = sorted(path.relative_to(SOURCE) for path in (SOURCE / "protocols").glob("*/*.obj"))
 TASKS = [name for name in PROTOCOLS if name.startswith(("stiffness", "size", "roughness"))]
 NOT_RUN = {"bench": "prints times and nothing else",
+           "design": "serves a page at an address of its own; tests/runner/design asks it",
            "stability --full": "takes minutes; the same with more stiffnesses"}
 
 ABOUT = File("about.json", '{"version": 1, "authors": [{"name": "Ada Example"}], "license": "CC-BY-4.0", "funding": ["A fund"]}')

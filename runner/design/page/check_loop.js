@@ -17,7 +17,7 @@ export class CheckLoop {
   #timer = 0;
   #asking = false;
 
-  /** \param told  {checked(check, values), pictured(picture, values)} */
+  /** \param told  {checked(check, values), pictured(picture, values), failed(why)} */
   constructor(document, told) {
     this.document = document;
     this.told = told;
@@ -50,8 +50,7 @@ export class CheckLoop {
         if (check.summary) this.told.pictured(await ask('picture', {text: disk}), values);
       }
     } catch (error) {
-      // The page says so if the program has gone; a fault of its own stands where faults stand.
-      if (text === this.document.text) this.told.checked({faults: [{pointer: '', line: null, text: error.message}]}, undefined);
+      if (text === this.document.text) this.told.failed(error.message);
     }
     this.#asking = false;
     if (this.document.text !== text) this.begin();

@@ -65,11 +65,18 @@ export function show_check(check, values, go_to) {
   show_faults(check, values, go_to);
   const about = by_id('about'), devices = by_id('devices');
   const whole = check.faults.length === 0 && check.summary !== undefined;
-  for (const part of [about, devices]) part.classList.toggle('stale', !whole);
+  for (const part of [about, devices, by_id('picture')]) part.classList.toggle('stale', !whole);
   if (!whole) return;
   about.querySelector('dl').replaceChildren(
       ...rows_about(check).flatMap(([term, text]) => [element('dt', {text: term}), element('dd', {text})]));
   const able = device => (device.can ? 0 : 1);
   devices.querySelector('ul').replaceChildren(
       ...[...check.devices].sort((a, b) => able(a) - able(b)).map(device_item));
+}
+
+/** Shows that a text was not checked. */
+export function show_failure(why) {
+  by_id('verdict').textContent = `Not checked: ${why}`;
+  by_id('verdict').className = 'bad';
+  for (const part of ['about', 'devices', 'picture']) by_id(part).classList.add('stale');
 }

@@ -161,14 +161,20 @@ export class Form {
       if (!place) continue;
       const is_own = row.dataset.row === fault.pointer;
       const member = fault.pointer.slice(row.dataset.row.length + 1);
-      place.textContent += (place.textContent ? ' ' : '') + (is_own ? fault.text : `${title_of(member)}: ${fault.text}`);
+      place.textContent += (place.textContent ? ' ' : '') + (is_own ? fault.text : `${in_words(member)}: ${fault.text}`);
       place.hidden = false;
-      if (!is_own) continue;
+      if (!is_own && row.querySelector('[data-row], .list')) continue;
       const control = row.querySelector('input, select, textarea, button');
       control?.setAttribute('aria-invalid', 'true');
       control?.setAttribute('aria-describedby', place.id);
     }
   }
+}
+
+/** "0" as "value 1", "layers/0/depth_m" as "layers, 1, depth". */
+function in_words(member) {
+  const steps = member.split('/').map(step => (/^\d+$/.test(step) ? String(Number(step) + 1) : title_of(step).toLowerCase()));
+  return steps.length === 1 && /^\d+$/.test(steps[0]) ? `Value ${steps[0]}` : steps.join(', ');
 }
 
 /** The innermost row of a pointer within an element. */

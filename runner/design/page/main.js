@@ -14,7 +14,7 @@ import {by_id, element} from './dom.js';
 import {choose_template} from './start_view.js';
 import {load_schemas} from './schema.js';
 import {save} from './save.js';
-import {show_check} from './check_view.js';
+import {show_check, show_failure} from './check_view.js';
 
 function banner(words) {
   by_id('banner').textContent = words;
@@ -35,6 +35,7 @@ class Page {
     this.picture = new PictureView();
     this.checks = new CheckLoop(this.document, {
       checked: (check, values) => this.#checked(check, values),
+      failed: why => show_failure(why),
       pictured: (picture, values) => this.picture.show(picture, Array.isArray(values?.stimuli) ? values.stimuli : []),
     });
     this.#listen();
@@ -118,11 +119,13 @@ class Page {
   }
 
   async save() {
-    if (this.document.is_saved || this.saving) return;
+    if (this.saving) return;
     this.saving = true;
     const focused = document.activeElement;
+    // What is typed in a field may not have been taken yet.
+    if (by_id('view').contains(focused) && focused.matches('input[type="text"], textarea')) focused.dispatchEvent(new Event('change'));
     try {
-      const words = await save(this.document, this.checks.faults);
+      const words = this.document.is_saved ? '' : await save(this.document, this.checks.faults);
       if (words) by_id('saved').textContent = words;
     } catch (error) {
       by_id('saved').textContent = `Not saved: ${error.message}`;

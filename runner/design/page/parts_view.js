@@ -89,8 +89,8 @@ export class PartView {
     const tabs = entries.map((entry, i) => element('button', {type: 'button', class: 'tab', 'aria-pressed': i === this.shown ? 'true' : 'false', 'data-index': String(i),
       'data-pointer': `${pointer_of_path(path)}#tab${i}`, text: entry?.name || `${part.one} ${i + 1}`, onclick: () => this.go_to(i)}));
     const add = element('button', {type: 'button', text: `Add a ${part.one}`, 'data-pointer': `${pointer_of_path(path)}#add`, onclick: () => this.#add()});
-    return element('div', {class: 'entries', 'data-row': pointer_of_path(path)}, element('div', {class: 'tabs', role: 'group', 'aria-label': part.title}, ...tabs, add), this.mesh?.place ?? null, fault_place(),
-        entries.length ? this.#entry(context, [part.list, this.shown], entries) : '');
+    return element('div', {class: 'entries', 'data-row': pointer_of_path(path)}, element('div', {class: 'tabs', role: 'group', 'aria-label': part.title}, ...tabs, add), fault_place(),
+        entries.length ? this.#entry(context, [part.list, this.shown], entries) : null, this.mesh?.place);
   }
 
   #entry(context, path, entries) {

@@ -64,7 +64,7 @@ export class TranslationView {
     const keys = new Set(this.texts.map(([key]) => key));
     this.stray = [...this.translated.keys()].filter(key => !keys.has(key));
     this.table.replaceChildren(...this.texts.map(([key, original]) => {
-      const area = element('textarea', {rows: String(Math.max(1, Math.ceil(original.length / 45))), 'aria-label': `${key}, ${this.language}`, lang: this.language, 'data-key': key, oninput: () => {
+      const area = element('textarea', {rows: String(Math.max(1, Math.ceil(original.length / 28))), 'aria-label': `${key}, ${this.language}`, lang: this.language, 'data-key': key, oninput: () => {
         if (area.value === '') this.translated.delete(key);
         else this.translated.set(key, area.value);
         this.is_changed = true;

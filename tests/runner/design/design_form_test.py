@@ -141,6 +141,19 @@ class Round(FormCase):
         self.wait_for("design.document.is_saved")
         self.assertEqual(path.read_text(), self.text())
 
+    def test_ctrl_s_takes_what_is_typed(self):
+        path = self.copy("ho2000.json")
+        self.page(path)
+        self.show("stimuli", 3)
+        self.js(f"(c => (c.focus(), c.select()))({self.control('/stimuli/3/name')})")
+        self.type("die")
+        self.key("s", "Control")
+        self.wait_for("design.document.is_saved && design.document.text.includes('die')")
+        values = json.loads(path.read_text())
+        self.assertEqual((values["stimuli"][3]["name"], values["response"]["keys"]["4"]), ("die", "die"))
+        self.settle()
+        self.assertEqual(self.focused(), "Name")
+
     def test_numbers_are_moved_and_not_calculated(self):
         self.page(self.copy("ho2000.json"))
         got = self.js("""import('/units.js').then(u => ['0.0255', '0.03', '1e-3', '-0.005', '0.1000', '12', '0', '.5', '1.23456789012345678', '5E2']
@@ -350,6 +363,7 @@ class Faults(FormCase):
         self.show("stimuli", 1)
         self.enter("/stimuli/1/radius_m", "-3")
         self.checked()
+        self.assertTrue(self.js("document.getElementById('picture').classList.contains('stale')"))
         said = self.ask("check", text=self.text())["faults"][0]["text"]
         field = self.control("/stimuli/1/radius_m")
         self.assertEqual(self.js(f"[{field}.getAttribute('aria-invalid'), document.getElementById({field}.getAttribute('aria-describedby')).textContent]"), ["true", said])
