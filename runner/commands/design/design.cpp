@@ -8,7 +8,10 @@
 #include "data/base/text.h"
 #include "runner/commands/shared/command.h"
 #include "runner/design/design_page.h"
+#include "runner/design/protocol_file.h"
+#include "runner/design/rehearsal.h"
 #include "runner/serve/loopback.h"
+#include "runner/serve/page_server.h"
 
 namespace palpate::runner::commands {
 namespace {

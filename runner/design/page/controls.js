@@ -1,7 +1,7 @@
 // Controls of the form: one for each value of the text. A control replaces the characters of its value alone.
 
 import {element} from './dom.js';
-import {node_at, parse, pointer_of_path, replaced, with_exchanged, with_item, without_item} from './json_text.js';
+import {id_of, node_at, parse, pointer_of_path, replaced, with_exchanged, with_item, without_item} from './json_text.js';
 import {decide, set_member, written} from './decisions.js';
 import {label_of, shown_number, unit_of, written_number} from './units.js';
 import {named_at, names_of} from './references.js';
@@ -52,7 +52,7 @@ export class Context {
 }
 
 /** Attributes by which the form finds a control again, and its fault. */
-const known = (path, more = {}) => ({'data-pointer': pointer_of_path(path), id: `field${pointer_of_path(path)}`, ...more});
+const known = (path, more = {}) => ({'data-pointer': pointer_of_path(path), id: id_of('field', pointer_of_path(path)), ...more});
 
 function number_control(context, path, schema) {
   const key = [...path].reverse().find(step => typeof step === 'string') ?? '';
@@ -189,7 +189,7 @@ function map_control(context, path, open) {
   const keys = Object.keys(context.value(path));
   const fresh = element('input', {type: 'text', 'aria-label': `New key of ${title_of(path.at(-1))}`, placeholder: 'key', 'data-pointer': `${pointer_of_path(path)}#key`});
   return element('div', {class: 'list', ...known(path)}, ...keys.map(key => element('div', {class: 'entry'},
-      element('label', {class: 'key', for: `field${pointer_of_path([...path, key])}`, text: key}), value_control(context, [...path, key], open),
+      element('label', {class: 'key', for: id_of('field', pointer_of_path([...path, key])), text: key}), value_control(context, [...path, key], open),
       element('span', {class: 'tools'}, element('button', {type: 'button', 'aria-label': `Remove ${key}`, text: '\u00d7', 'data-pointer': `${pointer_of_path(path)}#remove${key}`,
         onclick: () => context.rebuild(set_member(context.text, path, key, ''), null)})))),
   element('span', {class: 'entry'}, fresh, element('button', {type: 'button', text: 'Add', 'data-pointer': `${pointer_of_path(path)}#add`, onclick: () => {

@@ -1,7 +1,7 @@
 // The form of a part of the protocol, made from the schema: members that are there as fields, the others in a menu.
 
 import {Context, title_of, value_control} from './controls.js';
-import {NotJson, has_duplicates, parse, pointer_of_path} from './json_text.js';
+import {NotJson, has_duplicates, id_of, parse, pointer_of_path} from './json_text.js';
 import {element, by_id} from './dom.js';
 import {levels_of, names_of, renamed} from './references.js';
 import {schema_at} from './schema.js';
@@ -107,20 +107,20 @@ export class Form {
     const known = schema ?? this.schema.of({});
     const control = value_control(context, at, known);
     const inner = control.matches('fieldset, .list') || control.querySelector('fieldset, .list') !== null;
-    const label = element('label', {class: 'name', for: `field${pointer}`, text: title_of(key)});
+    const label = element('label', {class: 'name', for: id_of('field', pointer), text: title_of(key)});
     const remove = is_required ? null : element('button', {type: 'button', class: 'remove', title: `Remove ${title_of(key)}`, 'aria-label': `Remove ${title_of(key)}`,
       'data-pointer': `${pointer}#remove`, text: '\u00d7', onclick: () => this.rebuild(set_member(this.document.text, path, key, ''), null)});
     const words = belongs ? hint_in_words(key, known.resolved().json.description ?? '') : 'This key is unknown here.';
-    const hint = words ? element('span', {class: belongs ? 'hint' : 'hint alarm', id: `hint${pointer}`, text: words}) : null;
+    const hint = words ? element('span', {class: belongs ? 'hint' : 'hint alarm', id: id_of('hint', pointer), text: words}) : null;
     if (hint) control.querySelector?.('input, select, textarea')?.setAttribute('aria-describedby', hint.id);
-    return element('div', {class: inner ? 'row wide' : 'row', 'data-row': pointer}, label, control, remove, hint, element('span', {class: 'fault', id: `fault${pointer}`, hidden: true}));
+    return element('div', {class: inner ? 'row wide' : 'row', 'data-row': pointer}, label, control, remove, hint, element('span', {class: 'fault', id: id_of('fault', pointer), hidden: true}));
   }
 
   #missing(context, path, key, schema) {
     const pointer = pointer_of_path([...path, key]);
     return element('div', {class: 'row', 'data-row': pointer}, element('span', {class: 'name', text: title_of(key)}),
         element('button', {type: 'button', text: `Set ${title_of(key).toLowerCase()}`, 'data-pointer': pointer, onclick: () => this.#set(path, key, schema)}),
-        element('span', {class: 'fault', id: `fault${pointer}`, hidden: true}));
+        element('span', {class: 'fault', id: id_of('fault', pointer), hidden: true}));
   }
 
   #more(context, path, keys, properties) {

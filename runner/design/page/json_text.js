@@ -126,6 +126,9 @@ export function path_of_pointer(root, pointer) {
 }
 export const pointer_of_path = path => path.map(step => '/' + String(step).replace(/~/g, '~0').replace(/\//g, '~1')).join('');
 
+/** An id of an element for a pointer: without the spaces that part ids in attributes. */
+export const id_of = (kind, pointer) => `${kind}${pointer.replaceAll('%', '%25').replace(/\s/g, space => `%${space.charCodeAt(0).toString(16)}`)}`;
+
 // ---- edits: each returns the new text -----------------------------------------------------------
 
 const splice = (text, start, end, by) => text.slice(0, start) + by + text.slice(end);

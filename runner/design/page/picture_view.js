@@ -6,6 +6,8 @@ import {label_of, value_in_words} from './units.js';
 const {add, sub, times, size, surface_of, axes_of, painter, kLight, kDark} = palpate_drawing;
 const kGap = 0.14;    // of the largest stimulus
 const kFoot = 34;     // px below a row, for names
+const kHead = 26;     // px above all, for the scale
+const kLeastLabel = 34;  // px of a cell that has room for a name
 const dark = matchMedia('(prefers-color-scheme: dark)');
 
 /** What a picture cannot show of a stimulus: its texture, fields, knock, layers, what is seen of it. */
@@ -65,7 +67,10 @@ export class PictureView {
   }
 
   /** Shows an answer of "picture". `stimuli`: as the protocol has them, for what a picture cannot show. */
-  show({stimuli, stylus}, protocol_stimuli) {
+  show({stimuli: drawn, stylus}, protocol_stimuli) {
+    const known = new Map(protocol_stimuli.map(one => [one?.name, stimulus_in_words(one ?? {})]));
+    const base = name => name.replace(/\[.*/, '');
+    const stimuli = drawn.filter(one => known.has(base(one.name)));  // channels of a reach have no place of their own
     this.shapes = stimuli.filter(one => one.corners.length > 0).map(one => {
       const ends = pick => [0, 1, 2].map(k => one.corners.reduce((v, p) => pick(v, p[k]), one.corners[0][k]));
       const low = ends(Math.min), centre = times(0.5, add(low, ends(Math.max)));
@@ -73,9 +78,8 @@ export class PictureView {
       return {name: one.name, size: one.size_m, mesh: surface_of(corners, one.triangles), radius: corners.reduce((r, p) => Math.max(r, size(p)), 0)};
     });
     this.stylus = stylus;
-    const known = new Map(protocol_stimuli.map(one => [one.name, stimulus_in_words(one)]));
     this.root.querySelector('.sizes').replaceChildren(...stimuli.map(one => {
-      const words = [one.size_m ? in_mm(one.size_m) : 'no surface', ...(known.get(one.name.replace(/\[.*/, '')) ?? [])];
+      const words = [one.size_m ? in_mm(one.size_m) : 'no surface', ...(known.get(base(one.name)) ?? [])];
       if (one.all_triangles) words.push(`drawn with ${one.triangles.length} of its ${one.all_triangles} triangles`);
       return element('li', {}, element('b', {text: one.name}), ` ${words.join('; ')}`);
     }));
@@ -95,7 +99,7 @@ export class PictureView {
     for (let columns = 1; columns <= Math.max(1, this.shapes.length); ++columns) {
       const rows = Math.max(1, Math.ceil(this.shapes.length / columns));
       const w = columns * cell + 0.6 * cell;
-      const scale = Math.min(width / w, (height - rows * kFoot - 12) / Math.max(rows * cell, long * (rows === 1 ? 1 : 1.02)));
+      const scale = Math.min(width / w, (height - kHead - rows * kFoot) / Math.max(rows * cell, long * (rows === 1 ? 1 : 1.02)));
       if (!best || scale > best.scale) best = {columns, rows, scale, cell, long, w};
     }
     return best;
@@ -106,6 +110,7 @@ export class PictureView {
     if (!this.paint || !this.stylus || width === 0) return;
     const {columns, rows, scale, cell, long, w} = this.#layout(width, height);
     this.stage.radius = height / (3.4 * scale);
+    const down = kHead / scale / 2;  // m, of all, to leave room for the scale
     const to_px = ([x, , z]) => [width / 2 + x * scale, height / 2 - z * scale];
     const {right, into, up} = axes_of(this.turn);
     const column = k => [right[k], into[k], up[k]];
@@ -114,13 +119,15 @@ export class PictureView {
     const row_height = Math.max(cell + kFoot / scale, rows === 1 ? long + 16 / scale : 0);
     this.shapes.forEach((shape, i) => {
       const row = Math.floor(i / columns), in_row = Math.min(columns, this.shapes.length - row * columns);
-      const o = [-w / 2 + cell * (0.5 + (i % columns) + (columns - in_row) / 2), 0, ((rows - 1) / 2 - row) * row_height + kFoot / scale / 2];
+      const o = [-w / 2 + cell * (0.5 + (i % columns) + (columns - in_row) / 2), 0, ((rows - 1) / 2 - row) * row_height + kFoot / scale / 2 - down];
       objects.push({mesh: shape.mesh, object: {...turned, o}});
       const [x, y] = to_px([o[0], 0, o[2] - shape.radius]);
+      if (cell * scale < kLeastLabel) return;
       labels.push(element('span', {text: shape.name}));
+      labels.at(-1).style.maxWidth = `${cell * scale}px`;
       place(labels.at(-1), x, Math.min(y + 2, height - 18));
     });
-    const foot = [w / 2 - 0.3 * cell, 0, -long / 2 + kFoot / scale / 2];
+    const foot = [w / 2 - 0.3 * cell, 0, -long / 2 + kFoot / scale / 2 - down];
     const at = z => add(foot, [0, 0, z]);
     const segments = this.stylus.segments?.map(([a, b]) => [add(foot, a), add(foot, b)]) ?? [[at(0), at(long)]];
     this.paint({objects, mesh: null, virtual: [], ideal: segments, contact: null, force: [0, 0, 0]});

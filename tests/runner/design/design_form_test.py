@@ -336,7 +336,7 @@ class Edits(FormCase):
         self.press("/stimuli/0/texture#remove")
         self.assertEqual(self.text(), before)
 
-    def test_a_word_for_a_number_stays_with_its_fault(self):
+    def test_a_word_for_a_number_stays(self):
         self.page(self.copy("ho2000.json"))
         self.show("stimuli", 0)
         self.enter("/stimuli/0/radius_m", "thick")

@@ -101,6 +101,33 @@ class Access(DesignCase):
         self.assertEqual(self.request("GET", "/report/" + "0" * 32)[0], 404)
 
 
+class Opening(DesignCase):
+    def test_a_browser_reads_a_private_file(self):
+        # Stands for the user's: it notes what it is given and what it has inherited.
+        browser = self.dir / "xdg-open"
+        browser.write_text("""#!/bin/sh
+{ echo "$1"; stat -c %a "$1"; cat "$1"; for f in /proc/self/fd/*; do readlink "$f"; done; } > "$NOTE.draft" 2> /dev/null
+mv "$NOTE.draft" "$NOTE"
+""")
+        browser.chmod(0o755)
+        note = self.dir / "note"
+        environment = {**os.environ, "TMPDIR": str(self.temporary), "PATH": f"{self.dir}:{os.environ['PATH']}", "DISPLAY": ":77", "NOTE": str(note)}
+        process = subprocess.Popen([PALPATE, "design", self.copy("quick.json")], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+                                   env=environment)
+        self.addCleanup(process.communicate)
+        self.addCleanup(process.kill)
+        address = process.stdout.readline().strip()
+        self.until(note.exists)
+        path, mode, *rest = note.read_text().splitlines()
+        self.assertTrue(path.startswith(str(self.temporary)), path)
+        self.assertEqual(mode, "600")
+        self.assertIn(f'<a href="{address}">', "\n".join(rest))
+        self.assertNotIn(address, path)  # other users can read a command line
+        self.assertFalse([line for line in rest if line.startswith("socket:")], rest)
+        self.assertEqual(self.end(process), 0)
+        self.assertEqual(list(self.temporary.iterdir()), [])
+
+
 class Answers(DesignCase):
     def test_the_check_says_what_validate_says(self):
         self.design(self.copy("quick.json"))
