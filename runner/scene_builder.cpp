@@ -164,6 +164,59 @@ bool has_layers(const stimuli::ObjectSpec& spec) {
   return std::any_of(spec.parts.begin(), spec.parts.end(), has_layers);
 }
 
+/// The corners of the box about what is drawn of a stimulus, as it stands.
+/// \param builder  which has built it, as a rule
+DrawnBounds bounds_as_it_stands(const stimuli::ObjectSpec& object, SceneBuilder& builder) {
+  DrawnBounds out;
+  out.origin = object.pose.position;
+  const double infinite = std::numeric_limits<double>::infinity();
+  Vec3 low(infinite), high(-infinite);
+  const rendering::Scene scene = builder.build({object}, false);
+  const auto add = [&](const Vec3& corner) {
+    low = glm::min(low, corner);
+    high = glm::max(high, corner);
+  };
+  for (const rendering::ScenePart& part : scene.parts()) {
+    for (const Vec3& corner : part.mesh->vertices()) add(part.position + part.to_world * corner);
+  }
+  for (const rendering::PlacedSurface& placed : scene.surfaces()) {
+    add(placed.sphere_centre - Vec3(placed.sphere_radius));
+    add(placed.sphere_centre + Vec3(placed.sphere_radius));
+  }
+  for (const auto& soft : rendering::soft_objects(scene)) {
+    for (const Vec3& node : soft->rest) add(node);
+  }
+  for (int i = 0; i < 8; ++i)
+    out.points.emplace_back((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y,
+                            (i & 4) != 0 ? high.z : low.z);
+  return out;
+}
+
+/// \param reach  m, of the felt stimulus from the origin of the workspace
+/// \throws MeshError: what is drawn of it leaves the screen
+void require_on_screen(const protocols::Protocol& protocol, const protocols::StimulusSpec& stimulus,
+                       double reach, SceneBuilder& builder) {
+  if (!protocol.view || !stimulus.seen) return;
+  const protocols::SeenSpec& seen = *stimulus.seen;
+  if (!seen.object && !seen.picture) return;
+  DrawnBounds bounds;
+  if (protocol.orientation == protocols::OrientationKind::fixed) {
+    bounds = bounds_as_it_stands(seen.shape ? *seen.shape : stimulus.object, builder);
+  } else {
+    bounds.points = {Vec3(0)};
+    bounds.radius = reach;
+    if (seen.shape) {
+      bounds.radius = 0;
+      for (const Vec3& corner : bounds_as_it_stands(*seen.shape, builder).points)
+        bounds.radius = std::max(bounds.radius, glm::length(corner));
+    }
+  }
+  const std::string fault = off_screen(*protocol.view, workspace_of(protocol), seen, bounds);
+  if (!fault.empty())
+    throw stimuli::MeshError({"stimulus '" + stimulus.name + "': /seen/what: " + fault +
+                              ": move /view/eye_m or /view/screen_m, or draw it smaller"});
+}
+
 }  // namespace
 
 rendering::Tool tool_of(const protocols::ToolSpec& spec) {
@@ -729,62 +782,6 @@ rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& obj
   }
 }
 
-namespace {
-
-/// The corners of the box about what is drawn of a stimulus, as it stands.
-DrawnBounds bounds_as_it_stands(const stimuli::ObjectSpec& object) {
-  DrawnBounds out;
-  out.origin = object.pose.position;
-  const double infinite = std::numeric_limits<double>::infinity();
-  Vec3 low(infinite), high(-infinite);
-  const rendering::Scene scene = SceneBuilder().build({object}, false);
-  const auto add = [&](const Vec3& corner) {
-    low = glm::min(low, corner);
-    high = glm::max(high, corner);
-  };
-  for (const rendering::ScenePart& part : scene.parts()) {
-    for (const Vec3& corner : part.mesh->vertices()) add(part.position + part.to_world * corner);
-  }
-  for (const rendering::PlacedSurface& placed : scene.surfaces()) {
-    add(placed.sphere_centre - Vec3(placed.sphere_radius));
-    add(placed.sphere_centre + Vec3(placed.sphere_radius));
-  }
-  for (const auto& soft : rendering::soft_objects(scene)) {
-    for (const Vec3& node : soft->rest) add(node);
-  }
-  for (int i = 0; i < 8; ++i)
-    out.points.emplace_back((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y,
-                            (i & 4) != 0 ? high.z : low.z);
-  return out;
-}
-
-/// \param reach  m, of the felt stimulus from the origin of the workspace
-/// \throws MeshError: what is drawn of it leaves the screen
-void require_on_screen(const protocols::Protocol& protocol, const protocols::StimulusSpec& stimulus,
-                       double reach) {
-  if (!protocol.view || !stimulus.seen) return;
-  const protocols::SeenSpec& seen = *stimulus.seen;
-  if (!seen.object && !seen.picture) return;
-  DrawnBounds bounds;
-  if (protocol.orientation == protocols::OrientationKind::fixed) {
-    bounds = bounds_as_it_stands(seen.shape ? *seen.shape : stimulus.object);
-  } else {
-    bounds.points = {Vec3(0)};
-    bounds.radius = reach;
-    if (seen.shape) {
-      bounds.radius = 0;
-      for (const Vec3& corner : bounds_as_it_stands(*seen.shape).points)
-        bounds.radius = std::max(bounds.radius, glm::length(corner));
-    }
-  }
-  const std::string fault = off_screen(*protocol.view, workspace_of(protocol), seen, bounds);
-  if (!fault.empty())
-    throw stimuli::MeshError({"stimulus '" + stimulus.name + "': /seen/what: " + fault +
-                              ": move /view/eye_m or /view/screen_m, or draw it smaller"});
-}
-
-}  // namespace
-
 StimulusLibrary::StimulusLibrary(const protocols::Protocol& protocol, SceneBuilder builder)
     : soft_radius_(protocol.tool.radius > 0 ? protocol.tool.radius : protocols::kSoftRadius),
       gravity_(protocol.gravity),
@@ -836,7 +833,7 @@ StimulusLibrary::StimulusLibrary(const protocols::Protocol& protocol, SceneBuild
     effects_.push_back(effects_of({stimulus.object}));
     textures_.push_back(builder.texture_of(stimulus.object));
     moving_.push_back(builder.moving_of({stimulus.object}));
-    require_on_screen(protocol, stimulus, reach);
+    require_on_screen(protocol, stimulus, reach, builder);
     reaches_.push_back(reach);
     felt_.push_back(stimulus.felt);
   }
