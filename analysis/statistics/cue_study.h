@@ -22,7 +22,7 @@ struct CueDesign {
   bool asks_smaller = false;
 };
 
-/// \param text  of the protocol, which was read without faults \return none: it declares no cues
+/// \return none: the protocol declares no cues \throws nlohmann::json::exception: it has faults
 std::optional<CueDesign> read_cue_design(const std::string& text);
 
 /// By participant in the order of the table: all trials that count and were answered.

@@ -1,5 +1,6 @@
 #include "runner/study/cue_study.h"
 
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 #include <string>
@@ -12,13 +13,28 @@
 
 namespace palpate::runner::study {
 
+namespace {
+
+/// \throws UsageError: a file that --design names may be no protocol
+std::optional<analysis::CueDesign> design_of(const analysis::ProtocolText& protocol,
+                                             const std::string& source) {
+  try {
+    return analysis::read_cue_design(protocol.text);
+  } catch (const nlohmann::json::exception&) {
+    throw UsageError(source + ": --cues: the blocks that the key 'cues' of '" +
+                     printable(protocol.name) +
+                     "' names are missing or damaged; 'palpate validate' says where");
+  }
+}
+
+}  // namespace
+
 CueStudy analyze_cues(const Study& study, const analysis::CueSettings& settings) {
   const std::string source = printable(study.table.source);
   const auto& protocols = study.record.protocols;
   if (protocols.empty())
     throw UsageError(source + ": --cues: the blocks are in the protocol; give --design FILE");
-  const std::optional<analysis::CueDesign> design =
-      analysis::read_cue_design(protocols.front().text);
+  const std::optional<analysis::CueDesign> design = design_of(protocols.front(), source);
   if (!design)
     throw UsageError(source + ": --cues: the protocol '" + printable(protocols.front().name) +
                      "' has no key 'cues', which names the blocks");
