@@ -69,7 +69,7 @@ std::vector<std::string> cue_sentences(const CueAnalysis& analysis) {
       "JND with both cues, beside the predicted one: " + ratio_words(analysis.jnd_predicted) + ".");
   out.push_back(
       "JND with both cues, beside that of the better cue: " + ratio_words(analysis.jnd_better) +
-      (is_below(analysis.jnd_better) ? ": both are better than the better one."
+      (is_below(analysis.jnd_better) ? ": together they are better than the better one alone."
                                      : ": a gain over the better cue was not found."));
   if (!analysis.models.empty()) {
     const auto best = std::ranges::min_element(analysis.models, {}, &CueModelSum::aic);

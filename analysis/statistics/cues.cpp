@@ -37,12 +37,12 @@ double log_likelihood(const std::vector<LevelCount>& counts, double mu, double s
   return sum;
 }
 
-/// Centre and spread of the levels of an experiment, for scales and starts of searches.
-struct LevelScaleOf {
+/// Centre and width of the range of levels, to scale the parameters of a search.
+struct LevelRange {
   double centre = 0, spread = 1;
 };
 
-LevelScaleOf scale_of(const std::vector<LevelCount>& counts) {
+LevelRange scale_of(const std::vector<LevelCount>& counts) {
   double low = counts.front().level, high = low;
   for (const LevelCount& count : counts) {
     low = std::min(low, count.level);
@@ -56,7 +56,7 @@ double share_of(double x) { return 1 / (1 + std::exp(-x)); }
 
 /// Parameters as the search has them: unbounded numbers of like sizes.
 struct Coordinates {
-  LevelScaleOf haptic, visual;
+  LevelRange haptic, visual;
 
   double haptic_mu(const std::vector<double>& x) const {
     return haptic.centre + x[0] * haptic.spread;
@@ -124,7 +124,7 @@ struct SingleFit {
 };
 
 SingleFit fit_single(const std::vector<LevelCount>& counts, double lapse, double tolerance) {
-  const LevelScaleOf scale = scale_of(counts);
+  const LevelRange scale = scale_of(counts);
   const auto loss = [&](const std::vector<double>& x) {
     const double beyond = std::max({0.0, -6 - x[1], x[1] - 4, std::abs(x[0]) - 3});
     return beyond * beyond - log_likelihood(counts, scale.centre + x[0] * scale.spread,
@@ -155,7 +155,7 @@ double se_of_pse(const std::vector<LevelCount>& counts, double mu, double sd, do
 /// The standard deviation that all blocks have in common, each with a point of equality of its own,
 /// by maximum likelihood. \param points  gets those
 double fit_blocks(const std::vector<CueBlock>& blocks, double lapse, std::vector<CuePse>& points) {
-  const LevelScaleOf scale = scale_of(blocks.front().counts);
+  const LevelRange scale = scale_of(blocks.front().counts);
   std::vector<double> start, steps;
   for (const CueBlock& block : blocks) {
     const SingleFit own = fit_single(block.counts, lapse, 1e-6);

@@ -30,8 +30,8 @@ struct SeenTrial {
   std::uint64_t seed = 0;  ///< of the noise
 };
 
-/// Whether it can be drawn, and where the picture and an eye are. \param right  m, device frame,
-/// of the eye from midway between the eyes
+/// The screen of the station and an eye. \param right  m, device frame, of the eye from midway
+/// between both
 PictureWindow window_of(const SeenTrial& trial, double right = 0);
 
 /// What a frame needs of a tick.

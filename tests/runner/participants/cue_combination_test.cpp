@@ -59,7 +59,7 @@ TEST(CueCombination, BestAndSwitchingTakeOneOfBoth) {
   EXPECT_EQ(combined_estimate({.rule = CueSettings::Rule::switching}, both), 2);
 }
 
-TEST(CueCombination, CausalGivesUpWhatIsFarApartOrLate) {
+TEST(CueCombination, CausalGivesUpWhatIsFarOrLate) {
   const CueSettings settings{CueSettings::Rule::causal, 0.05, 0.5};
   CueEstimates near = estimates(1, 1.02), far = estimates(1, 3);
   near.range = far.range = 1;
