@@ -72,6 +72,16 @@ struct SeenRecord {
   static constexpr double kMostLag = 0.0225;
 };
 
+/// When contacts of a trial were heard, by the clock of the program: what a sound card adds is not
+/// in it (palpate devices --loopback measures that). After the intended delay.
+struct HeardRecord {
+  int knocks = 0;
+  double lag = 0;  ///< s, median from the tick of contact
+
+  /// s; half of what people notice between sound and touch (24 ms, Adelstein et al. 2003).
+  static constexpr double kMostLag = 0.012;
+};
+
 /// What a trial asks. Onset, response time and contact of its record are those of the last interval
 /// felt.
 struct TaskRecord {
@@ -91,7 +101,8 @@ struct TaskRecord {
   std::optional<double> confidence;
   std::optional<std::int64_t> confidence_ns;  ///< session clock
   std::optional<ReachRecord> reach = std::nullopt;
-  std::optional<SeenRecord> seen;  ///< none: nothing was drawn
+  std::optional<SeenRecord> seen;    ///< none: nothing was drawn
+  std::optional<HeardRecord> heard;  ///< none: no contact was heard
 
   bool of_block() const { return !block_name.empty(); }
 };

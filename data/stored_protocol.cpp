@@ -105,6 +105,7 @@ StoredProtocol read_stored_protocol(const std::string& text) {
     std::string name;
     read_text(stimulus, "name", name);
     if (!name.empty()) out.stimuli.push_back(name);
+    out.has_sound |= stimulus.is_object() && stimulus.contains("sound");
   }
   for (const auto& page : list_of(json, "pages")) read_columns(page, out.columns);
   out.has_view = json.contains("view");

@@ -41,6 +41,7 @@ struct StoredProtocol {
   GroupAssignment groups;                ///< of participants
   std::vector<StoredFactor> factors;     ///< empty: none
   bool has_view = false;                 ///< something may be seen beside touch
+  bool has_sound = false;                ///< contacts of a stimulus may be heard
   std::vector<std::string> tests;        ///< effects to adjust p values over; empty: all
 };
 

@@ -89,21 +89,9 @@ void read_picture(ObjectReader& section, const MeshFiles& files, stimuli::Textur
   section.text("file", name);
   const json* const value = section.member("file", Presence::required);
   if (value == nullptr || !value->is_string()) return;
-  const std::filesystem::path path = std::filesystem::path(files.folder) / name;
-  std::error_code error;
   texture.file_name = name;
-  texture.file = path.string();
-  if (const auto stored = files.stored.find(name); stored != files.stored.end()) {
-    texture.file_bytes = std::make_shared<const std::string>(stored->second);
-  } else if (files.others == OtherFiles::refuse) {
-    section.faults().add(section.pointer("file"),
-                         "expected a file that is stored with the protocol; '" + name + "' is not");
-  } else if (!std::filesystem::is_regular_file(path, error)) {
-    section.faults().add(section.pointer("file"),
-                         "expected an existing PNG file; there is no " + path.string());
-  } else {
-    texture.file_bytes = std::make_shared<const std::string>(read_text_file(path.string()));
-  }
+  texture.file = (std::filesystem::path(files.folder) / name).string();
+  texture.file_bytes = read_kept_file(section, "file", "PNG file", files);
 }
 
 void refuse_key(ObjectReader& section, const char* key, bool refused, const char* why) {

@@ -4,6 +4,7 @@
 #include <filesystem>
 #include <glm/geometric.hpp>
 #include <iterator>
+#include <memory>
 #include <optional>
 #include <string>
 #include <utility>
@@ -14,6 +15,7 @@
 #include "protocols/parse.h"
 #include "protocols/parse_effects.h"
 #include "protocols/parse_sight.h"
+#include "protocols/parse_sound.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/shapes.h"
@@ -519,6 +521,28 @@ void read_material(ObjectReader& reader, stimuli::Material& material) {
   read_layers(reader, material);
 }
 
+std::shared_ptr<const std::string> read_kept_file(ObjectReader& section, const char* key,
+                                                  const char* what, const MeshFiles& files) {
+  const json* const value = section.member(key);
+  if (value == nullptr || !value->is_string()) return nullptr;
+  const auto name = value->get<std::string>();
+  if (const auto stored = files.stored.find(name); stored != files.stored.end())
+    return std::make_shared<const std::string>(stored->second);
+  if (files.others == OtherFiles::refuse) {
+    section.faults().add(section.pointer(key),
+                         "expected a file that is stored with the protocol; '" + name + "' is not");
+    return nullptr;
+  }
+  const std::filesystem::path path = std::filesystem::path(files.folder) / name;
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) {
+    section.faults().add(section.pointer(key), std::string("expected an existing ") + what +
+                                                   "; there is no " + path.string());
+    return nullptr;
+  }
+  return std::make_shared<const std::string>(read_text_file(path.string()));
+}
+
 stimuli::ObjectSpec read_object(ObjectReader& reader, const stimuli::Material& default_material,
                                 const MeshFiles& files) {
   stimuli::ObjectSpec spec = read_nested(reader, default_material, files, 0);
@@ -544,6 +568,7 @@ StimulusSpec read_stimulus(ObjectReader& reader, const stimuli::Material& defaul
   });
   stimulus.object = read_object(reader, material, files);
   read_seen(reader, files, stimulus);
+  read_sound(reader, files, stimulus);
   reader.refuse_unknown_keys();
   return stimulus;
 }

@@ -2,6 +2,7 @@
 // Reading of objects, bodies, grids of numbers and tools, for scenes and protocols.
 
 #include <cstddef>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -49,6 +50,11 @@ struct MeshFiles {
   StoredFiles stored = {};  ///< contents that were stored with a protocol; these are preferred
   OtherFiles others = OtherFiles::read;
 };
+
+/// The file that a key names, beside the protocol or stored with it; null and a fault where there
+/// is none. \param what  it is, for messages
+std::shared_ptr<const std::string> read_kept_file(ObjectReader& section, const char* key,
+                                                  const char* what, const MeshFiles& files);
 
 /// Reads an object with the keys that its shape takes. The caller refuses unknown keys, since a
 /// stimulus has further keys.

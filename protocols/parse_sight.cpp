@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <filesystem>
 #include <glm/geometric.hpp>
 #include <string>
 
@@ -75,20 +74,7 @@ void read_seen_picture(ObjectReader& section, const MeshFiles& files, SeenSpec& 
   if (seen.file_name.empty()) return;
   if (!seen.picture)
     section.faults().add(section.pointer("picture"), "expected 'picture' in 'what' as well");
-  const std::filesystem::path path = std::filesystem::path(files.folder) / seen.file_name;
-  std::error_code error;
-  if (const auto stored = files.stored.find(seen.file_name); stored != files.stored.end()) {
-    seen.file_bytes = std::make_shared<const std::string>(stored->second);
-  } else if (files.others == OtherFiles::refuse) {
-    section.faults().add(
-        section.pointer("picture"),
-        "expected a file that is stored with the protocol; '" + seen.file_name + "' is not");
-  } else if (!std::filesystem::is_regular_file(path, error)) {
-    section.faults().add(section.pointer("picture"),
-                         "expected an existing PNG file; there is no " + path.string());
-  } else {
-    seen.file_bytes = std::make_shared<const std::string>(read_text_file(path.string()));
-  }
+  seen.file_bytes = read_kept_file(section, "picture", "PNG file", files);
   constexpr std::string_view kPng = "\x89PNG\r\n\x1a\n";
   if (seen.file_bytes && !seen.file_bytes->starts_with(kPng))
     section.faults().add(section.pointer("picture"), "expected a PNG file");

@@ -15,6 +15,7 @@
 #include "data/base/group_assignment.h"
 #include "protocols/procedures/procedure_spec.h"
 #include "protocols/sight.h"
+#include "protocols/sound.h"
 #include "stimuli/shapes.h"
 #include "stimuli/vec.h"
 
@@ -269,15 +270,17 @@ struct MaskingNoise {
 /// Short tones in the participant's headphones.
 struct Sounds {
   bool ready = false, go = false, feedback = false;
-  double level_db = -24;  ///< root mean square, dB re full scale
+  double level_db = -24;      ///< root mean square, dB re full scale
+  bool lag_accepted = false;  ///< a lag that people may notice does not refuse a session
 };
 
 struct StimulusSpec {
   std::string name;            ///< unique within the protocol; in a cell: data/base/cell_name.h
   stimuli::ObjectSpec object;  ///< material already resolved against the protocol's default
   std::size_t place = 0;       ///< in the protocol's list; in a cell: of the plain stimulus
-  std::optional<SeenSpec> seen = std::nullopt;  ///< none: nothing is seen of it
-  bool felt = true;                             ///< false: it is seen and gives no force
+  std::optional<SeenSpec> seen = std::nullopt;    ///< none: nothing is seen of it
+  bool felt = true;                               ///< false: it is seen and gives no force
+  std::optional<SoundSpec> sound = std::nullopt;  ///< of its contacts; none: they are silent
 };
 
 struct Protocol {

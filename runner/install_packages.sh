@@ -6,7 +6,7 @@ build=(g++ cmake ninja-build libboost-dev libboost-program-options-dev libeigen3
   libsqlitecpp-dev libusb-1.0-0-dev nettle-dev nlohmann-json3-dev pkg-config pybind11-dev python3-dev python3-numpy
   libdeflate-dev libexpat1-dev libzip-dev libzstd-dev zlib1g-dev
   fonts-noto-core libasound2-dev libegl-dev libepoxy-dev libfontconfig-dev libglfw3-dev libimgui-dev libpango1.0-dev
-  libpng-dev libstb-dev libwebp-dev libx11-dev libxrandr-dev)
+  libpng-dev libsamplerate0-dev libsndfile1-dev libstb-dev libwebp-dev libx11-dev libxrandr-dev)
 package=(dpkg-dev file help2man)  # `cmake --install` and cpack
 tests=(dbus-daemon imagemagick libbenchmark-dev libbullet-dev libegl1 libfcl-dev libode-dev libgl1-mesa-dri libgtest-dev librsvg2-bin
   libumockdev-dev libxml2-utils man-db openbox python3 python3-jsonschema python3-pytest umockdev x11-utils x11-xserver-utils xdotool xfwm4

@@ -40,7 +40,7 @@ MAY_INCLUDE = {
     "runner": BODIES | {"protocols", "rendering/bodies/soft"},
     "runner/servo": RENDERING | {"runner", "rendering/bodies/soft"},
     "runner/safety": SERVO,
-    "runner/sound": {"stimuli", "protocols"},
+    "runner/sound": RENDERING | {"protocols", "data", "runner/servo"},
     "runner/devices": SERVO | {"protocols", "data", "data/files", "runner/devices/falcon"},
     "runner/devices/falcon": SERVO | {"protocols"},
     "runner/display": SERVO | {"protocols", "runner/devices", "runner/safety", "runner/display/scene"},
@@ -117,7 +117,7 @@ PUBLIC = {
     "runner/evidence/scenes": "feature_costs scene_study",
     "runner/evidence/accuracy": "body_study methods paper_first_contact peers study union_study",
     "rendering/bodies/soft": "soft_scene",
-    "protocols": "answer_keys difference factors groups json_document parse protocol schedule session_plan sight sweep_space "
+    "protocols": "answer_keys difference factors groups json_document parse protocol schedule session_plan sight sound sweep_space "
                  "tasks/block_order tasks/block_procedures tasks/levels tasks/texts",
     "protocols/procedures": "procedure procedure_spec psychometric",
     "data/base": "cell_name checksum column_names group_assignment input_file json_text markdown random text",
@@ -136,10 +136,10 @@ PUBLIC = {
     "analysis/figures": "panel_drawing figures svg",
     "analysis/report": "coverage_report cue_report html_page hypotheses plan_record plan_report report study_report tables",
     "runner": "",
-    "runner/servo": "device force_limiter passivity realtime ring sample servo servo_thread "
+    "runner/servo": "device force_limiter heard_tick passivity realtime ring sample servo servo_thread "
                     "shared_value tick_source touched_places triple_buffer",
     "runner/safety": "fault_signals guarded_device shared_memory",
-    "runner/sound": "masking_noise",
+    "runner/sound": "loopback player sound_output sound_source",
     "runner/devices": "device_delay mouse registry self_test simulated",
     "runner/devices/falcon": "calibration falcon stylus_from_ends",
     "runner/display": "display explore_window mailbox seen text_display timeline window",
@@ -151,7 +151,7 @@ PUBLIC = {
                       "preflight run_record replay session session_end simulated_study "
                       "socket_advisor station",
     "runner/output": "outputs progress_line",
-    "runner/station": "admission opening protocol_check protocol_choice run_settings",
+    "runner/station": "admission opening protocol_check protocol_choice run_settings sound_timing",
     "runner/touch": "checked_meshes forces live_touch scene_notes trial_page",
     "runner/movement": "movement_study touched_trial",
     "runner/evidence/reports": "accuracy_report boundary_report scene_report stability_report stability_study",

@@ -124,6 +124,7 @@ constexpr std::array kColumnNames = std::to_array<std::string_view>({"adaptation
                                                                      "shape",
                                                                      "side_force",
                                                                      "simulated",
+                                                                     "sound_lag_ms",
                                                                      "standard_level",
                                                                      "started_inside",
                                                                      "stimulus",

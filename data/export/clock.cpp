@@ -47,9 +47,10 @@ bool have_reaches(Store& store) {
   });
 }
 
-bool have_views(Store& store) {
-  return std::ranges::any_of(store.protocols(), [](const ProtocolInfo& protocol) {
-    return read_stored_protocol(protocol.text).has_view;
+/// Whether any protocol has something.
+bool have(Store& store, bool StoredProtocol::*what) {
+  return std::ranges::any_of(store.protocols(), [what](const ProtocolInfo& protocol) {
+    return read_stored_protocol(protocol.text).*what;
   });
 }
 
@@ -59,7 +60,8 @@ ExportClock::ExportClock(Store& store, Times times)
     : times_(times),
       tasks_(have_blocks(store.protocols())),
       reaches_(have_reaches(store)),
-      seen_(have_views(store)),
+      seen_(have(store, &StoredProtocol::has_view)),
+      heard_(have(store, &StoredProtocol::has_sound)),
       torque_(store),
       groups_(store),
       factors_(factors_of(store)) {

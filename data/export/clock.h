@@ -27,6 +27,8 @@ class ExportClock {
   bool reaches() const { return reaches_; }
   /// Whether they have those of what was seen: a protocol has a view.
   bool seen() const { return seen_; }
+  /// Whether they have that of what was heard: a stimulus has a sound.
+  bool heard() const { return heard_; }
   /// Rows of trials have the column torque_driven if any run left torque out.
   const TorqueNotes& torque() const { return torque_; }
 
@@ -50,7 +52,7 @@ class ExportClock {
  private:
   std::int64_t since_first(const Participant& person, std::int64_t unix_ns) const;  // ns
   Times times_;
-  bool tasks_ = false, reaches_ = false, seen_ = false;
+  bool tasks_ = false, reaches_ = false, seen_ = false, heard_ = false;
   TorqueNotes torque_;
   ParticipantGroups groups_;
   std::vector<StoredFactor> factors_;

@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <charconv>
+#include <compare>
 #include <map>
 #include <mutex>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <tuple>
 
 #include "data/base/json_text.h"
 #include "data/files/text_sink.h"
@@ -242,6 +242,16 @@ std::vector<Column> with_sight(std::vector<Column> columns) {
   return columns;
 }
 
+std::vector<Column> with_sound(std::vector<Column> columns) {
+  columns.push_back(
+      {"sound_lag_ms",
+       "From the tick of a contact to its sound, by the program's clock, beyond the intended delay "
+       "and without what the sound card adds: median of the trial's knocks; missing: there was "
+       "none",
+       "ms"});
+  return columns;
+}
+
 std::vector<Column> with_torque(std::vector<Column> columns) {
   columns.push_back(
       {"torque_driven",
@@ -393,32 +403,43 @@ std::vector<Column> with_factors(std::vector<Column> columns,
   return columns;
 }
 
+/// Which columns a table has.
+struct ColumnSets {
+  bool cut_off = false;  ///< of attempts that were cut off
+  bool tasks = false, reaches = false, seen = false, heard = false, torque = false,
+       relative = false, groups = false;
+  std::vector<std::pair<std::string, std::string>> levels;  ///< of factors
+  auto operator<=>(const ColumnSets&) const = default;
+};
+
 /// \param cut_off  of attempts that were cut off
 std::span<const Column> columns_for(const ExportClock& clock, bool cut_off) {
-  const bool torque = !cut_off && clock.torque().any(), tasks = !cut_off && clock.tasks();
-  const bool reaches = !cut_off && clock.reaches(), seen = !cut_off && clock.seen();
-  const bool groups = clock.groups().any(), relative = clock.relative();
-  std::vector<std::pair<std::string, std::string>> levels;
+  ColumnSets sets{.cut_off = cut_off,
+                  .tasks = !cut_off && clock.tasks(),
+                  .reaches = !cut_off && clock.reaches(),
+                  .seen = !cut_off && clock.seen(),
+                  .heard = !cut_off && clock.heard(),
+                  .torque = !cut_off && clock.torque().any(),
+                  .relative = clock.relative(),
+                  .groups = clock.groups().any()};
   for (const StoredFactor& factor : clock.factors()) {
-    levels.emplace_back(factor.name, "");
-    levels.insert(levels.end(), factor.levels.begin(), factor.levels.end());
+    sets.levels.emplace_back(factor.name, "");
+    sets.levels.insert(sets.levels.end(), factor.levels.begin(), factor.levels.end());
   }
-  static std::map<std::tuple<bool, bool, bool, bool, bool, bool, bool, decltype(levels)>,
-                  std::vector<Column>>
-      tables;
+  static std::map<ColumnSets, std::vector<Column>> tables;
   static std::mutex mutex;
   const std::lock_guard lock(mutex);
-  const auto [table, is_new] = tables.try_emplace(
-      {cut_off, torque, tasks, reaches, seen, groups, relative, std::move(levels)});
+  const auto [table, is_new] = tables.try_emplace(sets);
   std::vector<Column>& columns = table->second;
   if (!is_new) return columns;
   columns = cut_off ? make_attempts() : make_trials();
-  if (tasks) columns = with_tasks(std::move(columns));
-  if (reaches) columns = with_reaches(std::move(columns));
-  if (seen) columns = with_sight(std::move(columns));
-  if (torque) columns = with_torque(std::move(columns));
-  if (relative) columns = made_relative(std::move(columns));
-  if (groups) columns = with_group(std::move(columns));
+  if (sets.tasks) columns = with_tasks(std::move(columns));
+  if (sets.reaches) columns = with_reaches(std::move(columns));
+  if (sets.seen) columns = with_sight(std::move(columns));
+  if (sets.heard) columns = with_sound(std::move(columns));
+  if (sets.torque) columns = with_torque(std::move(columns));
+  if (sets.relative) columns = made_relative(std::move(columns));
+  if (sets.groups) columns = with_group(std::move(columns));
   if (!clock.factors().empty()) columns = with_factors(std::move(columns), clock.factors());
   return columns;
 }

@@ -164,6 +164,10 @@ void put_columns_of_trial(Row& row, const StoredTrial& trial, const ExportClock&
     row << milliseconds(&SeenRecord::lag) << milliseconds(&SeenRecord::lag_p99)
         << (seen ? std::optional(seen->dropped) : std::nullopt);
   }
+  if (clock.heard()) {
+    const auto& heard = record.task.heard;
+    row << (heard ? std::optional(1000 * heard->lag) : std::nullopt);
+  }
   if (clock.torque().any()) row << clock.torque().driven(trial);
   if (clock.relative()) row << clock.elapsed(trial);
 }

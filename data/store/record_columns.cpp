@@ -78,6 +78,10 @@ void validate_task(Validator& validator, const TaskRecord& task) {
     for (const double value : {task.seen->lag, task.seen->lag_p99})
       validator.finite("a lag of what was seen", value);
   }
+  if (task.heard) {
+    validator.positive("knocks", task.heard->knocks);
+    validator.finite("a lag of what was heard", task.heard->lag);
+  }
   for (const IntervalRecord& interval : task.intervals) {
     validator.text("stimulus", interval.stimulus);
     if (interval.level) validator.finite("level", *interval.level);

@@ -84,6 +84,7 @@ std::optional<std::string> task_text(const TaskRecord& task) {
                    {"lag_s", task.seen->lag},
                    {"lag_p99_s", task.seen->lag_p99}};
   }
+  if (task.heard) out["heard"] = {{"knocks", task.heard->knocks}, {"lag_s", task.heard->lag}};
   return out.dump();
 }
 
@@ -108,6 +109,10 @@ TaskRecord parse_task_text(const std::string& text) {
       const Json& seen = in.at("seen");
       task.seen = {seen.at("frames").get<int>(), seen.at("dropped").get<int>(),
                    seen.at("lag_s").get<double>(), seen.at("lag_p99_s").get<double>()};
+    }
+    if (in.contains("heard")) {
+      const Json& heard = in.at("heard");
+      task.heard = {heard.at("knocks").get<int>(), heard.at("lag_s").get<double>()};
     }
     if (!in.contains("reach")) return task;
     const Json& reach = in.at("reach");

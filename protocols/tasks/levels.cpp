@@ -30,6 +30,8 @@ void add_files(const stimuli::ObjectSpec& object, StoredFiles& files) {
 
 void add_files(const StimulusSpec& stimulus, StoredFiles& files) {
   add_files(stimulus.object, files);
+  if (stimulus.sound && stimulus.sound->file_bytes)
+    files.emplace(stimulus.sound->file_name, *stimulus.sound->file_bytes);
   if (!stimulus.seen) return;
   if (stimulus.seen->file_bytes)
     files.emplace(stimulus.seen->file_name, *stimulus.seen->file_bytes);
@@ -55,8 +57,9 @@ StimulusSpec read_again(const json& value, const Protocol& protocol, const Stimu
 }
 
 /// Endings of names, and the unit that each stands for.
-constexpr std::array<std::pair<std::string_view, const char*>, 13> kUnits = {
-    {{"_m_per_s", "m/s"},
+constexpr std::array<std::pair<std::string_view, const char*>, 14> kUnits = {
+    {{"_per_m_per_s", "s/m"},
+     {"_m_per_s", "m/s"},
      {"_rad_per_s", "rad/s"},
      {"_per_s", "1/s"},
      {"_deg", "deg"},
@@ -117,6 +120,7 @@ StimulusSpec at_level(const Protocol& protocol, const TaskBlock& block, int stim
   StimulusSpec read = read_again(value, protocol, plain);
   varied.object = std::move(read.object);
   varied.seen = std::move(read.seen);
+  varied.sound = std::move(read.sound);
   return varied;
 }
 

@@ -327,6 +327,7 @@ void read_periphery(ObjectReader& reader, Protocol& protocol) {
     section.boolean("go", sounds.go);
     section.boolean("feedback", sounds.feedback);
     section.number("level_db", sounds.level_db, {-80, -12, "dB"});
+    section.choice("lag", sounds.lag_accepted, {{"limited", false}, {"accepted", true}});
   });
   reader.section("responses", [&](ObjectReader& section) {
     read_mapping(section, "joystick", protocol.responses.joystick, is_joystick_input,

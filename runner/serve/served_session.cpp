@@ -60,9 +60,8 @@ ServedSession::ServedSession(const Parts& parts)
     : parts_(parts),
       clock_(parts.station.clock),
       forces_(parts.servo, parts.guard, parts.station.clock),
-      noise_(parts.station, parts.noise,
-             [this](const std::string& trouble) { sound_trouble_ = trouble; }),
-      signals_(parts.station, parts.markers, noise_, parts.record.participant().code,
+      sound_(parts.station, [this](const std::string& trouble) { sound_trouble_ = trouble; }),
+      signals_(parts.station, parts.markers, sound_, parts.record.participant().code,
                parts.record.session()),
       session_(parts.station, *this, this, largest_reach(parts.station)) {
   for (const data::TrialRecord& record : parts.stored) trials_.push_back(short_json(record));
@@ -154,7 +153,7 @@ ServedSession::Outcome ServedSession::run(ServeOutput& output,
     forces_.off();
     throw;
   }
-  noise_.stop();
+  sound_.stop();
   const std::int64_t now = clock_.now_ns();
   if (!outcome.reason.empty()) parts_.record.note(now, "ended: " + outcome.reason);
   parts_.record.note(
@@ -238,7 +237,7 @@ MessageRefused ServedSession::forces_off() const {
 
 void ServedSession::held(const WhyOff& why) {
   held_by_ = why;
-  noise_.stop();
+  sound_.stop();
   const Refusal off = forces_off().why().front();
   refuse(std::exchange(start_, {}), off.code, off.message);
   keep_under_way();
@@ -270,7 +269,7 @@ void ServedSession::attend() {
   }
   forces_.newest();
   forces_.end_without_guard();
-  if (noise_.has_failed() && in_trial_) throw participants::TrialCutOff(sound_trouble_);
+  if (sound_.has_failed() && in_trial_) throw participants::TrialCutOff(sound_trouble_);
 }
 
 void ServedSession::left() {
@@ -497,12 +496,12 @@ void ServedSession::clear(const Asked& asked) {
 }
 
 void ServedSession::read(const std::string& text) {
-  noise_.stop();
+  sound_.stop();
   if (!text.empty()) tell("text", clock_.now_ns(), {{"text", text}});
 }
 
 void ServedSession::rest(const std::string& text, std::int64_t until_ns) {
-  noise_.stop();
+  sound_.stop();
   tell("rest", clock_.now_ns(), {{"text", text}, {"until_ns", until_ns}});
   while (clock_.now_ns() < until_ns) {
     attend();
@@ -511,7 +510,7 @@ void ServedSession::rest(const std::string& text, std::int64_t until_ns) {
 }
 
 void ServedSession::feedback(bool correct) {
-  noise_.cue(correct ? participants::SoundCue::right : participants::SoundCue::wrong);
+  sound_.cue(correct ? participants::SoundCue::right : participants::SoundCue::wrong);
 }
 
 /// Waits for `start` in every block.
@@ -521,7 +520,7 @@ std::optional<protocols::TrialChoice> ServedSession::choose(const protocols::Tri
     try {
       if (start_) {
         std::optional<protocols::TrialChoice> choice = choice_of(start_->message, next);
-        if (!noise_.start()) throw MessageRefused("no-sound", sound_trouble_);
+        if (!sound_.start()) throw MessageRefused("no-sound", sound_trouble_);
         return choice;
       }
     } catch (const MessageRefused& error) {  // practice may have continued with another trial
@@ -582,7 +581,7 @@ std::optional<participants::Answer> ServedSession::step(const servo::Sample& sam
     waits_for_ = sample.waiting;
     waits_since_ns_ = sample.time_ns;
     const bool far = sample.waiting == servo::Waiting::for_distance;
-    if (sample.waiting == servo::Waiting::for_rest) noise_.cue(participants::SoundCue::ready);
+    if (sample.waiting == servo::Waiting::for_rest) sound_.cue(participants::SoundCue::ready);
     tell("waiting", sample.time_ns, {{"for", far ? "distance" : "rest"}});
   }
   attend();

@@ -35,7 +35,6 @@ class ServedSession final : public participants::Respondent, public session::Ses
     servo::ServoThread& servo;
     safety::GuardedDevice* guard;  ///< null without force feedback
     session::Markers& markers;
-    sound::NoisePlayer* noise;  ///< null: none
     std::function<int()> end_requested;
     const std::vector<data::TrialRecord>& stored;  ///< completed trials of the session
     PictureOf picture;
@@ -127,7 +126,7 @@ class ServedSession final : public participants::Respondent, public session::Ses
   servo::Clock& clock_;
   session::LiveForces forces_;
   std::string sound_trouble_;
-  session::SessionNoise noise_;
+  session::SessionSound sound_;
   session::TrialSignals signals_;
   session::Session session_;
   TickStream ticks_;

@@ -26,7 +26,8 @@ ServoThread::ServoThread(Device& device, Clock& clock, const ServoSettings& sett
       awake_(settings.realtime.awake),
       ring_(settings.ring),
       places_(settings.touched_places ? kPlaces : 1),
-      tells_places_(settings.touched_places) {
+      tells_places_(settings.touched_places),
+      heard_(settings.heard) {
   servo_.keep_warm();
   if (settings.passivity_controller) servo_.control_passivity();
   std::promise<RealtimeRights> granted;
@@ -53,6 +54,7 @@ void ServoThread::run() noexcept {
     const Sample& sample = servo_.tick();
     if (tells_places_) publish_places(sample);  // first, so that a reader of the sample finds them
     publish(sample);
+    if (heard_ != nullptr && sample.phase == Phase::feeling) heard_->push(heard_tick(sample));
     if (sample.phase == Phase::feeling) felt_at_ = sample.probe;
     if (steps_left_ > 0) count_step();
     if (waits_) resume_when_back(sample.probe);

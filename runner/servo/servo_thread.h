@@ -17,6 +17,7 @@
 #include <vector>
 
 #include "runner/servo/bell.h"
+#include "runner/servo/heard_tick.h"
 #include "runner/servo/patience.h"
 #include "runner/servo/realtime.h"
 #include "runner/servo/ring.h"
@@ -38,6 +39,7 @@ struct ServoSettings {
   RealtimeSettings realtime;
   std::size_t ring = 16384;     ///< samples that can wait for the session; more are lost
   bool touched_places = false;  ///< also publish contact places of every tick
+  HeardTicks* heard = nullptr;  ///< every tick with forces for the ear; outlives the thread
 };
 
 /// Call prepare, next and stop in one thread, the session's; latest in one thread, which may be
@@ -158,6 +160,7 @@ class ServoThread final : public TickSource {
   TripleBuffer<Sample> latest_;
   Ring<TouchedPlaces> places_;
   bool tells_places_;
+  HeardTicks* const heard_;  ///< null: nobody listens
   TripleBuffer<rendering::BodyPull> pull_;
   // Used by the servo only:
   TrialScene* current_ = nullptr;                ///< shown, or stopped and kept for resume()

@@ -30,8 +30,8 @@ LiveSession::LiveSession(const LiveStation& station)
     : station_(station),
       forces_(station.servo_thread, station.guard, station.clock),
       hold_(station, forces_, [this](const std::string& message) { say(message); }),
-      noise_(station, station.noise, [this](const std::string& message) { say(message); }),
-      signals_(station, station.markers, noise_, station.record.participant().code,
+      sound_(station, [this](const std::string& message) { say(message); }),
+      signals_(station, station.markers, sound_, station.record.participant().code,
                station.record.session()),
       monitor_(station, {session_, respondent_, hold_, forces_, signals_}),
       respondent_(station.protocol, station.screen, *this, station.clock, station.answer_by),
@@ -48,7 +48,7 @@ LiveSession::Outcome LiveSession::run() {
   take_last_commands(outcome);
   outcome.recorded = session_.plan().done();
   outcome.trials = session_.plan().size();
-  noise_.stop();
+  sound_.stop();
   RunRecord& record = station_.record;
   if (outcome.end == data::RunEnd::withdrawn) record.begin();  // at any time
   const std::int64_t now = station_.clock.now_ns();
@@ -74,7 +74,7 @@ LiveSession::Outcome LiveSession::run_trials() {
         const EndOfSession end = end_by_signal(signal);
         return {end.end, end.what(), 0, 0, end.failed};
       }
-      noise_.stop();
+      sound_.stop();
       if (fault.trouble == servo::DeviceTrouble::guard_lost)
         return {data::RunEnd::aborted, fault.reason, 0, 0, true};
       hold_.hold(fault.reason, fault.is_transient(), fault.trouble);
@@ -110,11 +110,11 @@ void LiveSession::before_step() {
   if (longest && monitor_.elapsed() > *longest * 60)
     throw EndOfSession(data::RunEnd::paused,
                        "the session has lasted as long as the protocol allows");
-  if (now != Session::State::trial) noise_.stop();  // a page to read, and perhaps to discuss
+  if (now != Session::State::trial) sound_.stop();  // a page to read, and perhaps to discuss
   bool ready = false;
   while (!ready) {
     wait_while_held();
-    ready = now != Session::State::trial || noise_.start();
+    ready = now != Session::State::trial || sound_.start();
     if (!ready) hold_.pause();
   }
 }
@@ -130,7 +130,7 @@ void LiveSession::stop_if_due() {
 void LiveSession::wait_while_held() {
   using Kind = SessionHold::Kind;
   if (hold_.kind() == Kind::none) return;
-  noise_.stop();
+  sound_.stop();
   const auto& texts = station_.protocol.texts;
   const bool by_fault = hold_.kind() != Kind::pause || texts.break_text.empty();
   respondent_.show_message(by_fault ? texts.wait : texts.break_text);
@@ -154,7 +154,7 @@ void LiveSession::attend() {
     commands_.pop_front();
     obey(command);
   }
-  check_noise();
+  check_sound();
   check_screen();
   check_device();
   if (!monitor_.in_trial() || monitor_.asking()) respondent_.look_at_buttons(forces_.newest());
@@ -172,10 +172,10 @@ void LiveSession::attend() {
   forces_.end_without_guard();
 }
 
-void LiveSession::check_noise() {
-  if (!noise_.has_failed()) return;
+void LiveSession::check_sound() {
+  if (!sound_.has_failed()) return;
   hold_.pause();
-  if (monitor_.in_trial()) throw participants::TrialCutOff("the masking noise stopped");
+  if (monitor_.in_trial()) throw participants::TrialCutOff("the sound stopped");
 }
 
 /// A participant who cannot see the keys, or sees the console, must not go on: the experimenter

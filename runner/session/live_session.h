@@ -37,7 +37,7 @@ class LiveSession final : public participants::Attendant {
 
   /// For the session's own thread. \throws EndOfSession, TrialCutOff
   void attend() override;
-  void sound(participants::SoundCue cue) override { noise_.cue(cue); }
+  void sound(participants::SoundCue cue) override { sound_.cue(cue); }
   /// Shows a message to the experimenter.
   void say(const std::string& message) { monitor_.say(message); }
   /// Counts a recorded trial, for the accuracy so far.
@@ -52,7 +52,7 @@ class LiveSession final : public participants::Attendant {
   void plan_stop(display::ConsoleCommand::Kind kind);
   void correct(const display::ConsoleCommand& command);
   void take_last_commands(Outcome& outcome);
-  void check_noise();
+  void check_sound();
   void check_screen();
   void check_device();
   void note(std::int64_t at_ns, const std::string& text);
@@ -60,7 +60,7 @@ class LiveSession final : public participants::Attendant {
   const LiveStation& station_;
   LiveForces forces_;
   SessionHold hold_;
-  SessionNoise noise_;
+  SessionSound sound_;
   TrialSignals signals_;
   SessionMonitor monitor_;
   participants::KeyboardRespondent respondent_;

@@ -23,6 +23,7 @@ void add_files(const stimuli::ObjectSpec& spec, std::vector<data::ProtocolFile>&
 void add_files(const protocols::Protocol& protocol, std::vector<data::ProtocolFile>& files) {
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
     add_files(stimulus.object, files);
+    if (stimulus.sound) add_file(stimulus.sound->file_name, stimulus.sound->file_bytes, files);
     if (!stimulus.seen) continue;
     add_file(stimulus.seen->file_name, stimulus.seen->file_bytes, files);
     if (stimulus.seen->shape) add_files(*stimulus.seen->shape, files);

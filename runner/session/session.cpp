@@ -93,6 +93,14 @@ std::vector<std::size_t> open_questions(const PageSpec& page,
   return open;
 }
 
+/// \param lags  s, of each knock; \return none: there was none
+std::optional<data::HeardRecord> heard_record(std::vector<double> lags) {
+  if (lags.empty()) return std::nullopt;
+  const auto middle = lags.begin() + static_cast<std::ptrdiff_t>(lags.size() / 2);
+  std::ranges::nth_element(lags, middle);
+  return data::HeardRecord{static_cast<int>(lags.size()), *middle};
+}
+
 std::array<double, 3> values(const Vec3& v) { return {v.x, v.y, v.z}; }
 
 }  // namespace
@@ -129,6 +137,10 @@ void Session::prepare_interval(const protocols::Trial& trial, const protocols::I
   const rendering::Scene scene = scenes_.scene(trial, interval);
   const rendering::Renderer& renderer = renderer_for(interval.renderer);
   power_.begin(scene, renderer.side_contact());
+  if (station_.sound != nullptr) {
+    const auto sound = contact_sound(station_.protocol, trial, interval);
+    station_.sound->contacts(sound ? &*sound : nullptr);
+  }
   station_.servo.prepare(scene, renderer, home);
 }
 
@@ -619,6 +631,7 @@ bool Session::run_trial() {
   record_.contact_share = contact_.contact_share();
   record_.edge_dwell = contact_.edge_dwell(1 / station_.protocol.servo_rate);
   record_.task.seen = participant_.seen();
+  if (station_.sound != nullptr) record_.task.heard = heard_record(station_.sound->take_lags());
   if (events_ != nullptr) events_->answered(record_);
   return true;
 }

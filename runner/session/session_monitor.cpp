@@ -276,6 +276,9 @@ void SessionMonitor::recorded(const data::TrialRecord& record) {
   if (const auto& seen = record.task.seen; seen && seen->lag > data::SeenRecord::kMostLag)
     say("what is seen was " + milliseconds(std::llround(seen->lag * kSecond_ns)) +
         " late in trial " + std::to_string(record.trial) + ": people may notice 45 ms");
+  if (const auto& heard = record.task.heard; heard && heard->lag > data::HeardRecord::kMostLag)
+    say("contacts were heard " + milliseconds(std::llround(heard->lag * kSecond_ns)) +
+        " late in trial " + std::to_string(record.trial) + ": people may notice 24 ms");
   if (!record.response.empty() && !touched_ && !record.task.catch_trial) {
     say("trial " + std::to_string(record.trial) + " was answered before the first contact");
   }

@@ -61,6 +61,13 @@ const SharpEdges& SessionScenes::edges(const protocols::Trial& trial,
   return place.library.edges(place.stimulus);
 }
 
+std::optional<protocols::SoundSpec> contact_sound(const protocols::Protocol& protocol,
+                                                  const protocols::Trial& trial,
+                                                  const protocols::Interval& interval) {
+  if (interval.stimulus < 0) return std::nullopt;
+  return shown_stimulus(protocol, trial, interval).sound;
+}
+
 stimuli::ObjectSpec shown_object(const protocols::Protocol& protocol, const protocols::Trial& trial,
                                  const protocols::Interval& interval) {
   stimuli::ObjectSpec object = shown_stimulus(protocol, trial, interval).object;

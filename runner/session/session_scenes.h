@@ -40,6 +40,11 @@ class SessionScenes {
       known_;
 };
 
+/// What is heard of its contacts, at the interval's level; none: nothing.
+std::optional<protocols::SoundSpec> contact_sound(const protocols::Protocol& protocol,
+                                                  const protocols::Trial& trial,
+                                                  const protocols::Interval& interval);
+
 /// The object at the interval's level, placed in the world: for drawing.
 stimuli::ObjectSpec shown_object(const protocols::Protocol& protocol, const protocols::Trial& trial,
                                  const protocols::Interval& interval);

@@ -2,7 +2,7 @@
 
 namespace palpate::runner::session {
 
-bool SessionNoise::start() {
+bool SessionSound::start() {
   if (player_ == nullptr || on_record_) return true;
   try {
     player_->turn_on();
@@ -15,30 +15,29 @@ bool SessionNoise::start() {
   return true;
 }
 
-void SessionNoise::stop() {
+void SessionSound::stop() {
   if (!on_record_) return;
   on_record_ = false;
   player_->turn_off();
-  const sound::NoiseReport heard = player_->report();
+  const sound::SoundReport heard = player_->report();
   if (player_->has_noise()) station_.log.note(station_.clock.now_ns(), sound::to_json_text(heard));
-  if (heard.underruns > 0)
-    say_("the masking noise had " + std::to_string(heard.underruns) + " gaps");
+  if (heard.underruns > 0) say_("the sound had " + std::to_string(heard.underruns) + " gaps");
 }
 
-bool SessionNoise::has_failed() {
+bool SessionSound::has_failed() {
   if (!on_record_ || !player_->failed()) return false;
   say_(player_->report().trouble);
   stop();
   return true;
 }
 
-void SessionNoise::go_tone() {
+void SessionSound::go_tone() {
   const auto& sounds = station_.protocol.sounds;
   if (player_ != nullptr && (station_.protocol.masking_noise || (sounds && sounds->go)))
     player_->tone();
 }
 
-void SessionNoise::cue(participants::SoundCue cue) {
+void SessionSound::cue(participants::SoundCue cue) {
   const auto& sounds = station_.protocol.sounds;
   if (player_ == nullptr || !sounds) return;
   if (cue == participants::SoundCue::ready && sounds->ready) player_->tone(sound::Tone::ready);
@@ -46,9 +45,9 @@ void SessionNoise::cue(participants::SoundCue cue) {
   if (cue == participants::SoundCue::wrong && sounds->feedback) player_->tone(sound::Tone::wrong);
 }
 
-TrialSignals::TrialSignals(const Station& station, Markers& markers, SessionNoise& noise,
+TrialSignals::TrialSignals(const Station& station, Markers& markers, SessionSound& sound,
                            std::string participant, int session)
-    : station_(station), markers_(markers), noise_(noise) {
+    : station_(station), markers_(markers), sound_(sound) {
   marker_.participant = std::move(participant);
   marker_.session = session;
 }
@@ -71,7 +70,7 @@ void TrialSignals::began(const protocols::Trial& trial) {
 
 void TrialSignals::onset(const data::TrialRecord& so_far) {
   if (turned_) return;
-  noise_.go_tone();
+  sound_.go_tone();
   marker_.attempt = so_far.attempt;
   send(began_feeling_ ? Marker::Kind::interval : Marker::Kind::trial_start, so_far.onset_ns);
   began_feeling_ = true;

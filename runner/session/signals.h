@@ -1,5 +1,5 @@
 #pragma once
-// What a session sends beside forces and words: masking noise and tones to the participant's
+// What a session sends beside forces and words: sound to the participant's
 // headphones, markers to other recorders. Belongs to the session's thread.
 
 #include <cstdint>
@@ -11,26 +11,23 @@
 #include "runner/participants/respondent.h"
 #include "runner/session/markers.h"
 #include "runner/session/station.h"
-#include "runner/sound/masking_noise.h"
+#include "runner/sound/player.h"
 
 namespace palpate::runner::session {
 
 /// Plays while trials run; its start and end are on record. Does nothing without a player.
-class SessionNoise {
+class SessionSound {
  public:
-  /// \param player  may be null. \param say  takes messages for the experimenter. All must outlive
-  /// it.
-  SessionNoise(const Station& station, sound::NoisePlayer* player,
-               std::function<void(const std::string&)> say)
-      : station_(station), player_(player), say_(std::move(say)) {}
+  /// \param say  takes messages for the experimenter. Both must outlive it.
+  SessionSound(const Station& station, std::function<void(const std::string&)> say)
+      : station_(station), player_(station.sound), say_(std::move(say)) {}
 
-  /// Starts the noise, unless it plays. False: the sound output cannot be opened, which is
-  /// reported.
+  /// Starts the sound, unless it plays. False: the output cannot be opened, which is reported.
   bool start();
-  /// Stops the noise if it plays.
+  /// Stops the sound if it plays.
   void stop();
   /// True if the output has failed since start(), as when headphones are pulled out: reports it and
-  /// stops the noise.
+  /// stops the sound.
   bool has_failed();
   /// Plays the tone for "go": forces are on.
   void go_tone();
@@ -39,7 +36,7 @@ class SessionNoise {
 
  private:
   const Station& station_;
-  sound::NoisePlayer* player_;
+  sound::SoundPlayer* player_;
   std::function<void(const std::string&)> say_;
   bool on_record_ = false;  ///< its start is on record, its end is not yet
 };
@@ -48,7 +45,7 @@ class SessionNoise {
 class TrialSignals {
  public:
   /// \param participant  code. All but the code must outlive it.
-  TrialSignals(const Station& station, Markers& markers, SessionNoise& noise,
+  TrialSignals(const Station& station, Markers& markers, SessionSound& sound,
                std::string participant, int session);
 
   void began(const protocols::Trial& trial);
@@ -67,7 +64,7 @@ class TrialSignals {
 
   const Station& station_;
   Markers& markers_;
-  SessionNoise& noise_;
+  SessionSound& sound_;
   Marker marker_;               ///< of the current trial, to be filled in
   bool began_feeling_ = false;  ///< the first interval of the trial has begun
   bool turned_ = false;

@@ -18,7 +18,7 @@
 #include "runner/session/markers.h"
 #include "runner/session/run_record.h"
 #include "runner/session/socket_advisor.h"
-#include "runner/sound/masking_noise.h"
+#include "runner/sound/player.h"
 
 namespace palpate::runner::session {
 
@@ -31,14 +31,15 @@ struct Station {
   servo::Clock& clock;   ///< session clock, ns: of ticks, keys, markers. Simulated: virtual
   data::ClockStamp utc;  ///< one moment on the session clock and in UTC
   TrialLog& log;         ///< records every trial before the next one begins. Live: the run record
-  LevelAdvisor* advisor = nullptr;  ///< proposes levels of adaptive blocks; may be null
+  LevelAdvisor* advisor = nullptr;      ///< proposes levels of adaptive blocks; may be null
+  sound::SoundPlayer* sound = nullptr;  ///< what the participant hears; null: nothing
 };
 
 /// ns, between two polls of console, device and participant by the session's thread.
 inline constexpr std::int64_t kSessionNap_ns = 5'000'000;
 
 /// The parts of a live session: a person, a device, two displays. The servo, the watchdog, the
-/// displays, the markers and the noise have threads or processes of their own; all else belongs to
+/// displays, the markers and the sound have threads or processes of their own; all else belongs to
 /// the session's thread.
 struct LiveStation : Station {
   RunRecord& record;                        ///< participant, session, notes and trials
@@ -51,8 +52,7 @@ struct LiveStation : Station {
   display::ParticipantScreen& screen;
   display::ExperimenterConsole& console;
   participants::AnswerBy answer_by;
-  Markers& markers;           ///< for other recordings: EEG, motion capture
-  sound::NoisePlayer* noise;  ///< noise and tones in the participant's headphones; null: not wanted
+  Markers& markers;  ///< for other recordings: EEG, motion capture
 };
 
 /// m, the radius about the origin that holds every stimulus of the library in any orientation.

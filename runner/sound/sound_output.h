@@ -1,5 +1,5 @@
 #pragma once
-// The interface of a sound output: ALSA, or a substitute in tests.
+// The interfaces of a sound output and input: ALSA, or a substitute in tests.
 
 #include <cstdint>
 #include <memory>
@@ -14,11 +14,20 @@ class SoundError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// What is asked of an output; it takes the nearest that it can.
+struct SoundBuffer {
+  unsigned block = 64;  ///< frames that are written at a time
+  unsigned blocks = 2;  ///< that it holds
+};
+
 class SoundOutput {
  public:
   /// Plays the rest of its buffer.
   virtual ~SoundOutput() = default;
   virtual double rate() const = 0;  ///< Hz
+  virtual SoundBuffer buffer() const = 0;
+  /// Waits until the buffer has space for a block. \throws SoundError: the output has failed
+  virtual void wait() = 0;
   /// Waits until the buffer has space. \param samples  left and right interleaved, full scale 32767
   /// \return the number of underruns since the last call. \throws SoundError: the output has failed
   virtual int write(std::span<const std::int16_t> samples) = 0;
@@ -26,7 +35,17 @@ class SoundOutput {
   virtual double latency() = 0;
 };
 
+class SoundInput {
+ public:
+  virtual ~SoundInput() = default;
+  virtual double rate() const = 0;  ///< Hz
+  /// Waits for the next samples, of one channel, full scale 32767.
+  /// \return s, the age of the last of them. \throws SoundError: the input has failed
+  virtual double read(std::span<std::int16_t> samples) = 0;
+};
+
 /// \param device  name of an ALSA PCM: "default", "plughw:1", ... \throws SoundError
-std::unique_ptr<SoundOutput> open_sound(const std::string& device);
+std::unique_ptr<SoundOutput> open_sound(const std::string& device, const SoundBuffer& wanted);
+std::unique_ptr<SoundInput> open_sound_input(const std::string& device);
 
 }  // namespace palpate::runner::sound

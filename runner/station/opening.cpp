@@ -6,11 +6,13 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
+#include <utility>
 
 #include "data/base/text.h"
 #include "protocols/answer_keys.h"
 #include "protocols/tasks/texts.h"
 #include "runner/display/text_display.h"
+#include "runner/servo/realtime.h"
 #include "runner/session/device_check.h"
 #include "runner/usage_error.h"
 
@@ -98,10 +100,11 @@ std::unique_ptr<session::SampleStream> open_stream(const RunSettings& settings, 
 
 std::vector<std::string> notes_on_outlets(const RunSettings& settings,
                                           const protocols::Protocol& protocol,
-                                          const sound::NoisePlayer* player) {
+                                          const sound::SoundPlayer* player) {
   using nlohmann::ordered_json;
   std::vector<std::string> notes;
-  if (protocol.sounds && player == nullptr) notes.emplace_back(R"({"sounds":"left out"})");
+  if ((protocol.sounds || has_contact_sound(protocol)) && player == nullptr)
+    notes.emplace_back(R"({"sounds":"left out"})");
   if (protocol.masking_noise && player == nullptr)
     notes.emplace_back(R"({"masking_noise":"left out"})");
   if (!settings.markers.empty()) {
@@ -123,17 +126,39 @@ void print_dropped(const session::Markers& markers, const session::SampleStream*
                  static_cast<unsigned long long>(stream->dropped()));
 }
 
-std::unique_ptr<sound::NoisePlayer> open_noise(const RunSettings& settings,
-                                               const protocols::Protocol& protocol) {
-  if (settings.without_noise) return nullptr;
-  if (!protocol.masking_noise) {
-    if (!protocol.sounds) return nullptr;
-    return std::make_unique<sound::NoisePlayer>(protocol.sounds->level_db, settings.sound_device);
-  }
-  std::optional<double> tones_db;
-  if (protocol.sounds) tones_db = protocol.sounds->level_db;
-  return std::make_unique<sound::NoisePlayer>(*protocol.masking_noise, protocol.seed,
-                                              settings.sound_device, sound::open_sound, tones_db);
+bool has_contact_sound(const protocols::Protocol& protocol) {
+  return std::ranges::any_of(protocol.stimuli,
+                             [](const auto& stimulus) { return stimulus.sound.has_value(); });
+}
+
+bool has_sound(const protocols::Protocol& protocol) {
+  return protocol.masking_noise || protocol.sounds || has_contact_sound(protocol);
+}
+
+std::unique_ptr<sound::SoundPlayer> open_sound(const RunSettings& settings,
+                                               const protocols::Protocol& protocol,
+                                               servo::HeardTicks& heard) {
+  if (settings.without_noise || !has_sound(protocol)) return nullptr;
+  sound::SoundSettings wanted;
+  wanted.device = settings.sound_device;
+  wanted.noise = protocol.masking_noise;
+  if (protocol.sounds) wanted.tones_db = protocol.sounds->level_db;
+  wanted.seed = protocol.seed;
+  if (has_contact_sound(protocol)) wanted.ticks = &heard;
+  wanted.realtime = real_time_for_sound;
+  auto player = std::make_unique<sound::SoundPlayer>(std::move(wanted));
+  // Reads the recordings, before anybody waits for a trial.
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
+    player->contacts(stimulus.sound ? &*stimulus.sound : nullptr);
+  player->contacts(nullptr);
+  return player;
+}
+
+bool real_time_for_sound() {
+  servo::RealtimeSettings realtime;
+  realtime.priority = 70;  // below the servo's
+  realtime.lock_memory = realtime.awake = false;
+  return servo::request_realtime(realtime).fifo;
 }
 
 std::unique_ptr<participants::ResponseBox> open_response_box(

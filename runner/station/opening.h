@@ -16,7 +16,7 @@
 #include "runner/servo/servo_thread.h"
 #include "runner/session/markers.h"
 #include "runner/session/sample_stream.h"
-#include "runner/sound/masking_noise.h"
+#include "runner/sound/player.h"
 #include "runner/station/run_settings.h"
 
 namespace palpate::runner::station {
@@ -49,13 +49,22 @@ std::unique_ptr<session::SampleStream> open_stream(const RunSettings& settings, 
 /// that are left out. \param player  null: no noise and sounds
 std::vector<std::string> notes_on_outlets(const RunSettings& settings,
                                           const protocols::Protocol& protocol,
-                                          const sound::NoisePlayer* player);
+                                          const sound::SoundPlayer* player);
 /// To standard error: what other recorders did not take. \param stream  may be null
 void print_dropped(const session::Markers& markers, const session::SampleStream* stream);
 
-/// Null with --without-noise, or if the protocol has neither noise nor sounds. \throws SoundError
-std::unique_ptr<sound::NoisePlayer> open_noise(const RunSettings& settings,
-                                               const protocols::Protocol& protocol);
+/// Whether contacts of a stimulus are heard.
+bool has_contact_sound(const protocols::Protocol& protocol);
+/// Whether anything is heard.
+bool has_sound(const protocols::Protocol& protocol);
+inline constexpr std::size_t kHeardTicks = 4096;  ///< that can wait for the sound's thread
+/// Asks for real-time scheduling of the calling thread, after the servo's; false: denied.
+bool real_time_for_sound();
+/// Null with --without-noise, or if nothing is heard. \param heard  of the servo; outlives it
+/// \throws SoundError
+std::unique_ptr<sound::SoundPlayer> open_sound(const RunSettings& settings,
+                                               const protocols::Protocol& protocol,
+                                               servo::HeardTicks& heard);
 
 /// What the newest run of a protocol with a view says of the lag of its frames.
 /// \return a note for the record: the lag is accepted; empty: it is short, or unknown

@@ -1,6 +1,7 @@
 #include "runner/station/protocol_check.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <map>
 #include <utility>
@@ -9,10 +10,14 @@
 #include "protocols/factors.h"
 #include "protocols/schedule.h"
 #include "protocols/tasks/block_order.h"
+#include "protocols/tasks/levels.h"
 #include "runner/devices/registry.h"
 #include "runner/devices/simulated.h"
 #include "runner/participants/simulated_settings.h"
+#include "runner/session/effect_check.h"
 #include "runner/session/simulated_study.h"
+#include "runner/sound/sound_output.h"
+#include "runner/sound/sound_source.h"
 
 namespace palpate::runner::station {
 namespace {
@@ -171,6 +176,56 @@ std::vector<Verdict> device_verdicts(const protocols::Protocol& protocol,
   return out;
 }
 
+namespace {
+
+/// \param noise  of the protocol
+std::string masked_note(const protocols::SoundSpec& sound, const protocols::MaskingNoise& noise) {
+  constexpr double kTap = 0.2;  // m/s, of an ordinary tap
+  double loudest = sound.modes.empty() ? 1 : 0;
+  for (const protocols::SoundSpec::Mode& mode : sound.modes) loudest += mode.gain;
+  const double rms = std::min(kTap * sound.gain * loudest, sound::kLoudest) / std::sqrt(2.0);
+  if (rms > 0 && 20 * std::log10(rms) >= noise.level_db) return {};
+  return "/sound/gain_per_m_per_s: at 0.2 m/s its loudest moment is below the masking noise of " +
+         protocols::level_text(noise.level_db) + " dB";
+}
+
+}  // namespace
+
+std::vector<std::string> effect_notes(const protocols::Protocol& protocol,
+                                      const StimulusLibrary& library) {
+  std::vector<std::string> out;
+  for (std::size_t i = 0; i < protocol.stimuli.size(); ++i) {
+    const protocols::StimulusSpec& stimulus = protocol.stimuli[i];
+    const std::string begin = "stimulus " + stimulus.name + ": ";
+    for (const std::string& note :
+         session::effect_notes(stimulus.object, library.texture(i), protocol.servo_rate))
+      out.push_back(begin + note);
+    if (!stimulus.sound || !protocol.masking_noise) continue;
+    const std::string note = masked_note(*stimulus.sound, *protocol.masking_noise);
+    if (!note.empty()) out.push_back(begin + note);
+  }
+  return out;
+}
+
+std::vector<protocols::Fault> sound_faults(const protocols::Protocol& protocol,
+                                           const std::string& file) {
+  constexpr double kRate = 48000;  // Hz, any
+  std::vector<protocols::Fault> faults;
+  sound::SoundSources sources(kRate);
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
+    if (!stimulus.sound) continue;
+    const std::string place = "/stimuli/" + std::to_string(stimulus.place) + "/sound/file";
+    const auto told = [&](const protocols::Fault& fault) { return fault.location == place; };
+    if (std::ranges::any_of(faults, told)) continue;
+    try {
+      sources.of(*stimulus.sound);
+    } catch (const sound::SoundError& error) {
+      faults.push_back({file, place, error.what(), 0});
+    }
+  }
+  return faults;
+}
+
 Verdict simulation_verdict(const protocols::Protocol& protocol, const StimulusLibrary& library) {
   const participants::SimulatedSettings settings = participants::load_simulated_settings("");
   const devices::SimulatedStylus stylus(settings.device, settings.hand, protocol.stylus.length,
@@ -242,6 +297,7 @@ Json protocol_json(const std::string& file, const protocols::Protocol& protocol,
   Json out = faults_json(file, {});
   out["summary"] = summary_json(protocol);
   out["notes"] = notes;
+  for (const std::string& note : effect_notes(protocol, library)) out["notes"].push_back(note);
   out["devices"] = Json::array();
   const auto add = [&](const protocols::Protocol& shown, const StimulusLibrary& stimuli,
                        const std::string& group) {

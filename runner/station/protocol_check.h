@@ -35,6 +35,14 @@ std::vector<Verdict> device_verdicts(const protocols::Protocol& protocol,
                                      const std::vector<devices::ChainTiming>& measured);
 Verdict simulation_verdict(const protocols::Protocol& protocol, const StimulusLibrary& library);
 
+/// Sentences that whoever runs the study should know of its stimuli' effects and sounds.
+std::vector<std::string> effect_notes(const protocols::Protocol& protocol,
+                                      const StimulusLibrary& library);
+
+/// The recordings that cannot be read, each with its place. \param file  of the protocol
+std::vector<protocols::Fault> sound_faults(const protocols::Protocol& protocol,
+                                           const std::string& file);
+
 /// A cause, and all places that have it.
 struct GroupedReason {
   std::string text;                ///< the first place's sentence

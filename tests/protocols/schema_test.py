@@ -157,9 +157,9 @@ class Protocols:
             failures.append(f"everything.json and scene-textures.json lack {sorted(unused)}")
         own = {k: v for k, v in self.version_2.schema.items() if k != "$defs"}
         own["$defs"] = {k: v for k, v in self.version_2.schema["$defs"].items() if k != "one"}
-        unused = properties(own) - keys_in("everything-v2.json", "external-v2.json", "procedures-v2.json", "reach-v2.json", "seen-v2.json")
+        unused = properties(own) - keys_in("everything-v2.json", "external-v2.json", "procedures-v2.json", "reach-v2.json", "seen-v2.json", "heard-v2.json")
         if unused:
-            failures.append(f"everything-v2.json, external-v2.json, procedures-v2.json, reach-v2.json and seen-v2.json lack {sorted(unused)}")
+            failures.append(f"everything-v2.json, external-v2.json, procedures-v2.json, reach-v2.json, seen-v2.json and heard-v2.json lack {sorted(unused)}")
         return failures
 
     def of_mesh_files(self):

@@ -109,11 +109,6 @@ RegistrationSettings registration_settings(const po::variables_map& values) {
   return settings;
 }
 
-std::string now_utc() {
-  return data::format_utc(std::chrono::system_clock::now().time_since_epoch() /
-                          std::chrono::nanoseconds(1));
-}
-
 /// One device with the nominal scale: a stored calibration must not affect the measurement.
 servo::DeviceConfig uncalibrated(const servo::DeviceConfig& config, const std::string& serial) {
   servo::DeviceConfig one = config;
@@ -218,6 +213,11 @@ int let_it_calibrate(const devices::DeviceKind& kind, const servo::DeviceConfig&
 }
 
 }  // namespace
+
+std::string now_utc() {
+  return data::format_utc(std::chrono::system_clock::now().time_since_epoch() /
+                          std::chrono::nanoseconds(1));
+}
 
 void add_calibrate_options(po::options_description& options) {
   auto add = options.add_options();

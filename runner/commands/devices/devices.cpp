@@ -758,8 +758,13 @@ void add_options(CommandLine& line) {
       ("no-fifo", "--timing: without real-time priority")                                         //
       ("no-realtime", "--timing: without any real-time right")                                    //
       ("core", po::value<int>()->default_value(-1, "any")->value_name("N"),
-       "--timing: on this processor only")             //
-      ("calibrate", "guided calibration of a device")  //
+       "--timing: on this processor only")  //
+      ("sound", po::value<std::string>()->value_name("NAME"),
+       "measure how late contacts are heard at an ALSA device (with --loopback); with "
+       "--calibration FILE it is stored beside that")  //
+      ("loopback", po::value<std::string>()->value_name("IN"),
+       "--sound: the ALSA input to which a cable leads back from the output")  //
+      ("calibrate", "guided calibration of a device")                          //
       ("markers", po::value<std::vector<std::string>>()->composing()->value_name("WHERE"),
        "send one marker of each kind, half a second apart, to what `palpate run --markers` takes; "
        "exit status 1 when one is not taken")                                               //
@@ -836,6 +841,8 @@ int devices_command(const std::vector<std::string>& args) {
     }
     return try_markers((*values)["markers"].as<std::vector<std::string>>());
   }
+  if (values->count("loopback") != values->count("sound"))
+    throw UsageError("--sound and --loopback go together: the output and the input of a cable");
   const servo::DeviceConfig config = config_of(*values);
   output::Outputs outputs(*values, {"json"}, {"calibration", "firmware"});
   if (values->count("report") > 0) {
@@ -856,6 +863,18 @@ int devices_command(const std::vector<std::string>& args) {
   }
   Json report = {{"program_version", PALPATE_VERSION}};
   int status = 0;
+  if (values->count("sound") > 0) {
+    for (const char* other : {"device", "timing", "calibrate", "report"}) {
+      if (values->count(other) > 0)
+        throw UsageError(
+            std::string("--sound measures sound and nothing else; it does not go with --") + other);
+    }
+    status = measure_sound((*values)["sound"].as<std::string>(),
+                           (*values)["loopback"].as<std::string>(), config.calibration, report);
+    outputs.put("json", report.dump(2) + "\n");
+    outputs.write();
+    return status;
+  }
   if (values->count("timing") == 0) {
     status = list_devices(only, config, report);
   } else {

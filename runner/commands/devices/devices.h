@@ -1,5 +1,5 @@
 #pragma once
-// What the devices command calls for --calibrate and --report.
+// What the devices command calls for --calibrate, --sound and --report.
 
 #include <boost/program_options.hpp>
 #include <nlohmann/json.hpp>
@@ -18,6 +18,15 @@ void add_calibrate_options(boost::program_options::options_description& options)
 /// arm (forcedimension). \returns the exit status. \throws UsageError, std::runtime_error.
 int calibrate_devices(const devices::DeviceKind& kind, const servo::DeviceConfig& config,
                       const boost::program_options::variables_map& values);
+
+/// The time of a measurement.
+std::string now_utc();
+
+/// Measures how late contacts are heard at a sound device, by a cable that leads back to an input,
+/// prints it, adds it to the report and stores it beside a calibration ("": nowhere).
+/// \return the exit status
+int measure_sound(const std::string& device, const std::string& input,
+                  const std::string& calibration, nlohmann::ordered_json& report);
 
 // `palpate devices --report FILE`: the facts about a lab's device that palpate's developers need,
 // in one file without personal data.

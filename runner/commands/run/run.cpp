@@ -34,6 +34,7 @@
 #include "runner/session/station.h"
 #include "runner/station/admission.h"
 #include "runner/station/opening.h"
+#include "runner/station/sound_timing.h"
 
 // `palpate run`: a live session with a person and a device. Opens the station, runs the session in
 // a thread of its own beside the display's loop, and reports. The path to a force continues in
@@ -157,12 +158,13 @@ void tell(session::LiveSession& session, const session::LiveStation& station,
     session.say("torque is left out: this device drives force alone");
     record.note(began_ns, data::kTorqueLeftOutNote);
   }
-  if (station.protocol.sounds && station.noise == nullptr)
+  if ((station.protocol.sounds || station::has_contact_sound(station.protocol)) &&
+      station.sound == nullptr)
     session.say("WITHOUT the protocol's sounds");
-  if (station.protocol.masking_noise && station.noise == nullptr)
+  if (station.protocol.masking_noise && station.sound == nullptr)
     session.say("WITHOUT the protocol's masking noise");
   for (const std::string& note :
-       station::notes_on_outlets(known.settings, station.protocol, station.noise))
+       station::notes_on_outlets(known.settings, station.protocol, station.sound))
     record.note(began_ns, note);
   const std::string& missing = station.servo_thread.rights().missing;
   if (!missing.empty()) session.say(missing);
@@ -310,7 +312,7 @@ int run_command(const std::vector<std::string>& args) {
   protocols::Protocol& protocol = admission.protocol;
   translate_texts(settings, admission);
 
-  // The device behind its watchdog, which is forked before markers and noise start their threads.
+  // The device behind its watchdog, which is forked before markers and sound start their threads.
   auto marker_sinks = station::open_markers(settings);
   safety::FaultSignals signals;
   const station::OpenDevice open = station::open_device(kind, settings, protocol);
@@ -322,12 +324,15 @@ int run_command(const std::vector<std::string>& args) {
   const std::vector<session::LimitedMaterial> limited = session::limit_materials(protocol, device);
   const StimulusLibrary library(protocol);
   station::check_fitness(open, settings, protocol, library);
-  const auto noise = station::open_noise(settings, protocol);
+  servo::HeardTicks heard(station::kHeardTicks);
+  const auto sound = station::open_sound(settings, protocol, heard);
 
   // The record. Data from a simulated device is labelled simulated, whoever answers.
   data::Store store = data::Store::open(settings.database, data::Store::Mode::write_or_create);
   warn_of_exposure(store.path());
   if (std::string note = station::check_seen_lag(store, protocol); !note.empty())
+    admission.notes.push_back(std::move(note));
+  if (std::string note = station::check_sound_lag(store, protocol, settings); !note.empty())
     admission.notes.push_back(std::move(note));
   servo::RealClock clock;
   const data::Participant participant =
@@ -338,7 +343,8 @@ int run_command(const std::vector<std::string>& args) {
     std::fprintf(stderr, "no consent is recorded (--consent VERSION)\n");
 
   // The servo loop, without forces until the first trial; the displays, each of which can end them.
-  const servo::ServoSettings servo_settings = station::servo_settings_of(protocol);
+  servo::ServoSettings servo_settings = station::servo_settings_of(protocol);
+  if (station::has_contact_sound(protocol)) servo_settings.heard = &heard;
   const session::ForceDirectionCheck direction_check(limits_of(servo_settings, device),
                                                      device.actuated_freedom);
   const std::int64_t servo_began_ns = clock.now_ns();
@@ -376,19 +382,18 @@ int run_command(const std::vector<std::string>& args) {
   std::optional<session::StreamedServo> streamed;
   if (stream) streamed.emplace(servo, *stream);
   servo::TickSource& ticks = streamed ? static_cast<servo::TickSource&>(*streamed) : servo;
-  const session::LiveStation station{
-      {protocol, library, plan, ticks, clock, began, record, advisor ? &*advisor : nullptr},
-      record,
-      device,
-      open.guard,
-      servo,
-      open.guard != nullptr ? &direction_check : nullptr,
-      [&signals] { return signals.end_requested(); },
-      screen,
-      display->console(),
-      answer_by(settings),
-      markers,
-      noise.get()};
+  const session::LiveStation station{{protocol, library, plan, ticks, clock, began, record,
+                                      advisor ? &*advisor : nullptr, sound.get()},
+                                     record,
+                                     device,
+                                     open.guard,
+                                     servo,
+                                     open.guard != nullptr ? &direction_check : nullptr,
+                                     [&signals] { return signals.end_requested(); },
+                                     screen,
+                                     display->console(),
+                                     answer_by(settings),
+                                     markers};
   const Beforehand known{settings, admission,      limited,
                          progress, servo_began_ns, news(resumed, *display, limited)};
   const session::LiveSession::Outcome outcome =

@@ -48,7 +48,8 @@ void add_sound_options(po::options_description& options, station::RunSettings& s
   options.add_options()  //
       ("sound-device",
        po::value(&settings.sound_device)->default_value("default")->value_name("NAME"),
-       "ALSA device of the headphones, where the protocol has masking noise or sounds")  //
+       "ALSA device of the headphones, where the protocol has masking noise or sounds; "
+       "palpate devices --sound measures how late it is")  //
       ("without-noise", po::bool_switch(&settings.without_noise),
        "run without the protocol's masking noise and sounds");
 }

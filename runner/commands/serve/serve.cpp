@@ -25,6 +25,7 @@
 #include "runner/session/recorded_outcome.h"
 #include "runner/station/admission.h"
 #include "runner/station/opening.h"
+#include "runner/station/sound_timing.h"
 #include "runner/touch/forces.h"
 #include "runner/touch/trial_page.h"
 
@@ -293,7 +294,7 @@ int serve_scene(const po::variables_map& values, const station::RunSettings& run
 
 int serve_session(const station::RunSettings& settings, const po::variables_map& values) {
   const devices::DeviceKind& kind = station::find_device_kind(settings.device);
-  const station::Admission admission = station::admit(settings);
+  station::Admission admission = station::admit(settings);
   protocols::Protocol protocol = admission.protocol;
   if (const std::string why = serve::unserved(protocol); !why.empty())
     throw UsageError("--protocol: " + why);
@@ -309,10 +310,13 @@ int serve_session(const station::RunSettings& settings, const po::variables_map&
   station::check_fitness(open, settings, protocol, library);
   Recorders recorders(std::move(sinks), protocols::event_codes(protocol), settings,
                       protocol.servo_rate);
-  const auto noise = station::open_noise(settings, protocol);
+  servo::HeardTicks heard(station::kHeardTicks);
+  const auto sound = station::open_sound(settings, protocol, heard);
 
   data::Store store = data::Store::open(settings.database, data::Store::Mode::write_or_create);
   warn_of_exposure(store.path());
+  if (std::string note = station::check_sound_lag(store, protocol, settings); !note.empty())
+    admission.notes.push_back(std::move(note));
   servo::RealClock clock;
   const data::Participant participant =
       store.look_up(admission.enrolled, admission.participant, admission.number, device.simulated);
@@ -333,24 +337,26 @@ int serve_session(const station::RunSettings& settings, const po::variables_map&
     std::cerr << resumed << "\n";
 
   record.note(clock.now_ns(), R"({"served":{"preflight":"left out"}})");
-  if (noise == nullptr && (protocol.masking_noise || protocol.sounds))
+  if (sound == nullptr && station::has_sound(protocol))
     std::cerr << "WITHOUT the protocol's masking noise and sounds\n";
-  for (const std::string& note : station::notes_on_outlets(settings, protocol, noise.get()))
+  for (const std::string& note : station::notes_on_outlets(settings, protocol, sound.get()))
     record.note(clock.now_ns(), note);
   for (const std::string& note : admission.notes) record.note(clock.now_ns(), note);
   if (!limited.empty())
     record.note(clock.now_ns(), session::to_json_text(limited, device, protocol.servo_rate));
-  servo::ServoThread servo(*open.device, clock, station::servo_settings_of(protocol));
+  servo::ServoSettings servo_settings = station::servo_settings_of(protocol);
+  if (station::has_contact_sound(protocol)) servo_settings.heard = &heard;
+  servo::ServoThread servo(*open.device, clock, servo_settings);
   std::optional<session::StreamedServo> streamed;
   if (recorders.stream) streamed.emplace(servo, *recorders.stream);
   servo::TickSource& ticks = streamed ? static_cast<servo::TickSource&>(*streamed) : servo;
-  const session::Station station{protocol, library, plan, ticks, clock, began, record};
+  const session::Station station{protocol, library, plan,    ticks,      clock,
+                                 began,    record,  nullptr, sound.get()};
   serve::ServedSession served({.station = station,
                                .record = record,
                                .servo = servo,
                                .guard = open.guard,
                                .markers = recorders.markers,
-                               .noise = noise.get(),
                                .end_requested = [&signals] { return signals.end_requested(); },
                                .stored = progress.completed,
                                .picture = picture_of});

@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <iomanip>
 #include <iostream>
+#include <iterator>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <utility>
@@ -20,7 +21,6 @@
 #include "runner/devices/simulated.h"
 #include "runner/serve/served_scene.h"
 #include "runner/session/device_check.h"
-#include "runner/session/effect_check.h"
 #include "runner/session/simulated_study.h"
 #include "runner/station/protocol_check.h"
 #include "runner/study/task_words.h"
@@ -67,10 +67,16 @@ std::string time_in_words(double seconds) {
   return out.str();
 }
 
-/// The summary's line about masking noise, if there is any.
-std::string masking(const protocols::Protocol& protocol) {
-  if (!protocol.masking_noise) return "";
+/// The summary's lines about what is heard, if there is anything.
+std::string heard(const protocols::Protocol& protocol) {
+  std::vector<std::string> sounding;
+  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
+    if (stimulus.sound && stimulus.name == base_name(stimulus.name))
+      sounding.push_back(stimulus.name);
+  }
   std::ostringstream out;
+  if (!sounding.empty()) out << "  sounds      contacts of " << list(sounding) << "\n";
+  if (!protocol.masking_noise) return out.str();
   out << "  noise       " << protocols::to_string(protocol.masking_noise->kind) << ", "
       << protocol.masking_noise->level_db << " dB re full scale, through headphones\n";
   return out.str();
@@ -109,7 +115,7 @@ void print_task_summary(const protocols::Protocol& protocol, std::ostream& out) 
   out << "  trials      at most " << trials << " for each participant\n  duration    about "
       << time_in_words(duration.usual) << ", at most " << time_in_words(duration.longest)
       << "; breaks and pages besides\n"
-      << masking(protocol) << "  seed        " << protocol.seed << "\n"
+      << heard(protocol) << "  seed        " << protocol.seed << "\n"
       << "  sha256      " << protocol.sha256 << "\n";
 }
 
@@ -138,7 +144,7 @@ void print_summary(const protocols::Protocol& protocol, std::ostream& out) {
       << time_in_words(duration.usual) << " at " << trial << " s a trial, at most "
       << time_in_words(duration.longest) << "; breaks"
       << (protocol.practice.criterion ? " and further rounds of practice besides\n" : " besides\n")
-      << masking(protocol) << "  seed        " << protocol.seed << "\n"
+      << heard(protocol) << "  seed        " << protocol.seed << "\n"
       << "  sha256      " << protocol.sha256 << "\n";
 }
 
@@ -306,10 +312,9 @@ void print_protocol(const protocols::Protocol& protocol, SceneBuilder builder,
     const rendering::SoftObject* const soft = library.soft(i);
     const auto felt = soft != nullptr ? touch::elements_felt(*soft) : std::nullopt;
     if (felt) out << "  note        stimulus " << protocol.stimuli[i].name << ": " << *felt << "\n";
-    for (const std::string& note :
-         session::effect_notes(protocol.stimuli[i].object, library.texture(i), protocol.servo_rate))
-      out << "  note        stimulus " << protocol.stimuli[i].name << ": " << note << "\n";
   }
+  for (const std::string& note : station::effect_notes(protocol, library))
+    out << "  note        " << note << "\n";
   if (!protocol.groups.any()) print_fitness(protocol, library, measured, out);
   for (std::size_t i = 0; i < protocol.group_protocols.size(); ++i) {
     const protocols::Protocol& group = *protocol.group_protocols[i];
@@ -342,7 +347,8 @@ void validate_file(const ValidateRequest& request, std::ostream& out) {
     return;
   }
   SceneBuilder builder;
-  const std::vector<protocols::Fault> faults = touch::mesh_faults(protocol, file, builder);
+  std::vector<protocols::Fault> faults = touch::mesh_faults(protocol, file, builder);
+  std::ranges::move(station::sound_faults(protocol, file), std::back_inserter(faults));
   if (!faults.empty()) throw protocols::InputError(faults);
   if (!request.json) return print_protocol(protocol, std::move(builder), request.measured, out);
   const std::vector<std::string> notes = touch::stimulus_notes(protocol, builder);

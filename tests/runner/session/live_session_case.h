@@ -149,18 +149,18 @@ class LiveSessions : public ::testing::Test {
     Markers markers(std::move(sinks));
     RunRecord record(*store_, info_of(protocol_), participant_, info);
     record.begin();
-    const LiveStation station{{protocol_, library_, plan, servo, clock_, {0, 0}, record},
-                              record,
-                              device.capabilities(),
-                              nullptr,
-                              servo,
-                              nullptr,
-                              [this] { return signal_; },
-                              screen_,
-                              console_,
-                              by,
-                              markers,
-                              noise_.get()};
+    const LiveStation station{
+        {protocol_, library_, plan, servo, clock_, {0, 0}, record, nullptr, sound_.get()},
+        record,
+        device.capabilities(),
+        nullptr,
+        servo,
+        nullptr,
+        [this] { return signal_; },
+        screen_,
+        console_,
+        by,
+        markers};
     return LiveSession(station).run();
   }
 
@@ -184,7 +184,7 @@ class LiveSessions : public ::testing::Test {
   Console console_{clock_};
   std::vector<Marker> markers_;
   int signal_ = 0;
-  std::unique_ptr<sound::NoisePlayer> noise_;
+  std::unique_ptr<sound::SoundPlayer> sound_;
   std::optional<data::Store> store_;
   data::Participant participant_;
 };

@@ -136,6 +136,8 @@ class Headphones final : public sound::SoundOutput {
  public:
   explicit Headphones(Plugged plugged) : plugged_(std::move(plugged)) {}
   double rate() const override { return 8000; }
+  sound::SoundBuffer buffer() const override { return {160, 2}; }
+  void wait() override {}
   int write(std::span<const std::int16_t>) override {
     if (!*plugged_) throw sound::SoundError("pulled out");
     return 0;
@@ -147,12 +149,13 @@ class Headphones final : public sound::SoundOutput {
 };
 TEST_F(LiveSessions, LostHeadphonesCutOffTheTrialAndPause) {
   const Plugged plugged = std::make_shared<std::atomic<bool>>(true);
-  noise_ = std::make_unique<sound::NoisePlayer>(
-      protocols::MaskingNoise{}, 1, "headphones",
-      [plugged](const std::string&) -> std::unique_ptr<sound::SoundOutput> {
-        if (!*plugged) throw sound::SoundError("no headphones");
-        return std::make_unique<Headphones>(plugged);
-      });
+  sound::SoundSettings settings{.device = "headphones", .noise = protocols::MaskingNoise{}};
+  settings.open = [plugged](const std::string&,
+                            const sound::SoundBuffer&) -> std::unique_ptr<sound::SoundOutput> {
+    if (!*plugged) throw sound::SoundError("no headphones");
+    return std::make_unique<Headphones>(plugged);
+  };
+  sound_ = std::make_unique<sound::SoundPlayer>(std::move(settings));
   FakeDevice device([&](int tick) {
     if (tick == 30) *plugged = false;  // in the first trial
     return at(0.1);
@@ -165,7 +168,7 @@ TEST_F(LiveSessions, LostHeadphonesCutOffTheTrialAndPause) {
   EXPECT_EQ(run(device).end, data::RunEnd::done);
   EXPECT_GE(console_.pauses, 2);
   ASSERT_GE(cut_off_reasons().size(), 1u);
-  EXPECT_EQ(cut_off_reasons()[0], "the masking noise stopped");
+  EXPECT_EQ(cut_off_reasons()[0], "the sound stopped");
   std::vector<std::string> events;
   for (const data::StoredNote& note : store_->notes()) {
     if (note.text.find("masking_noise") != std::string::npos) events.push_back(note.text);

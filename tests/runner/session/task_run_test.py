@@ -15,7 +15,7 @@ import subprocess
 import time
 import unittest
 
-from task_case import PALPATE, Task
+from task_case import PALPATE, PROTOCOL, Task
 
 PAGES = [
     {"name": "consent", "kind": "consent", "consent_version": "3b", "text": "YOU MAY STOP\fDO YOU TAKE PART"},
@@ -305,6 +305,30 @@ class Periphery(Task):
             level = 10 * math.log10(sum(x * x for x in steady) / len(steady) / 32767 ** 2)
             self.assertAlmostEqual(level, -18, delta=0.5)
         self.assertEqual([note["level_db"] for note in self.notes() if note.get("sounds") == "on"], [-18])
+
+    def test_contacts_are_heard_where_the_stimulus_has_a_sound(self):
+        sound = self.dir / "sound.raw"
+        ball, box = PROTOCOL["stimuli"]
+        rings = {"kind": "modal", "gain_per_m_per_s": 5, "pan": -1, "modes": [{"frequency_hz": 800, "decay_per_s": 30}]}
+        terminal = self.start("ident", options=["--sound-device", f"file:{sound},raw"], stimuli=[{**ball, "sound": rings}, box])
+        self.play(terminal, ("WELCOME", " "), ("ABOUT", " "), ("MORE", " "))
+        for _ in range(2):  # the simulated hand moves to and fro
+            self.play(terminal, ("[trial, ", ""))
+            time.sleep(1.5)
+            self.play(terminal, ("", "1"))
+        self.play(terminal, ("GOOD BYE", " "))
+        self.end(terminal)
+        left, right = (array.array("h", sound.read_bytes())[ear::2] for ear in (0, 1))
+        self.assertFalse(any(right), "it is heard at the left ear alone")
+        self.assertGreater(max(left), 300)
+        self.assertLessEqual(max(left), 32767 * 10 ** (-12 / 20))
+        begin = next(i for i, value in enumerate(left) if value)
+        part = left[begin:begin + 1920]
+        self.assertAlmostEqual(sum(a < 0 <= b for a, b in zip(part, part[1:])) / 0.04, 800, delta=30)
+        latency, = (note["latency_s"] for note in self.notes() if note.get("sounds") == "on")
+        rows = {row["shape"]: row["sound_lag_ms"] for row in self.export()}
+        self.assertEqual(rows["box"], "")
+        self.assertGreaterEqual(float(rows["ball"]) + 0.05, 1000 * latency)
 
     def test_omitted_sounds_are_recorded(self):
         terminal = self.start("ident", options=["--without-noise", "--sound-device", "none such"],

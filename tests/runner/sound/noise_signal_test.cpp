@@ -1,11 +1,11 @@
+#include "runner/sound/noise_signal.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <complex>
 #include <vector>
-
-#include "runner/sound/masking_noise.h"
 
 namespace palpate::runner::sound {
 namespace {

@@ -1,5 +1,7 @@
 // The player's thread, with a scripted output.
 
+#include "runner/sound/player.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "runner/sound/masking_noise.h"
+#include "runner/sound/noise_signal.h"
 
 namespace palpate::runner::sound {
 namespace {
@@ -40,6 +42,8 @@ class Headphones final : public SoundOutput {
  public:
   explicit Headphones(Ear& ear) : ear_(ear) {}
   double rate() const override { return 8000; }
+  SoundBuffer buffer() const override { return {160, 2}; }
+  void wait() override {}
   int write(std::span<const std::int16_t> samples) override {
     while (true) {
       if (ear_.pulled) throw SoundError("pulled out");
@@ -62,14 +66,18 @@ void wait_for(const Condition& condition) {
 
 class Players : public ::testing::Test {
  protected:
-  std::unique_ptr<NoisePlayer> player() {
-    return std::make_unique<NoisePlayer>(protocols::MaskingNoise{protocols::NoiseKind::white, -20},
-                                         1, "ear", [this](const std::string&) {
-                                           ++ear_.opened;
-                                           if (ear_.pulled) throw SoundError("pulled out");
-                                           return std::make_unique<Headphones>(ear_);
-                                         });
+  SoundSettings settings(double level_db) {
+    SoundSettings out{.device = "ear"};
+    out.noise = protocols::MaskingNoise{protocols::NoiseKind::white, level_db};
+    out.seed = 1;
+    out.open = [this](const std::string&, const SoundBuffer&) {
+      ++ear_.opened;
+      if (ear_.pulled) throw SoundError("pulled out");
+      return std::make_unique<Headphones>(ear_);
+    };
+    return out;
   }
+  std::unique_ptr<SoundPlayer> player() { return std::make_unique<SoundPlayer>(settings(-20)); }
   Ear ear_;
 };
 
@@ -112,9 +120,9 @@ TEST_F(Players, AToneThatInterruptsAnotherDoesNotClick) {
     return amplitude * (2 * M_PI * pitch + 1 / 0.01) / kRate;
   };
   for (int i = 0; i < 8; ++i) {
-    auto noise = std::make_unique<NoisePlayer>(
-        protocols::MaskingNoise{protocols::NoiseKind::white, -60}, 1, "ear",
-        [this](const std::string&) { return std::make_unique<Headphones>(ear_); }, kTonesDb);
+    SoundSettings quiet = settings(-60);
+    quiet.tones_db = kTonesDb;
+    auto noise = std::make_unique<SoundPlayer>(std::move(quiet));
     const auto before = static_cast<std::ptrdiff_t>(ear_.count());
     const auto heard = [&] { return static_cast<std::ptrdiff_t>(ear_.count()) - before; };
     noise->tone(Tone::ready);
@@ -199,7 +207,7 @@ TEST_F(Players, DoNotBlockWhenTheOutputHangs) {
 }
 
 TEST(NoisePlayer, WithoutAnOutputItThrows) {
-  EXPECT_THROW(NoisePlayer({}, 1, "no such device"), SoundError);
+  EXPECT_THROW(SoundPlayer(SoundSettings{.device = "no such device"}), SoundError);
 }
 
 }  // namespace
