@@ -232,6 +232,10 @@ Figures deviations(const TaskCell& cell) {
   return of_reaches(cell, [](const Reaches& one) { return one.deviation; });
 }
 
+Figures aftereffects(const TaskCell& cell) {
+  return of_reaches(cell, [](const Reaches& one) { return one.catch_deviation; });
+}
+
 Figures adaptations(const TaskCell& cell) {
   return of_reaches(cell, [](const Reaches& one) { return one.adaptation; });
 }
@@ -258,6 +262,7 @@ std::vector<Measure> measures() {
           {"jnd", setting_jnds},
           {kRating, ratings},
           {"deviation", deviations, "m"},
+          {"aftereffect", aftereffects, "m"},
           {"adaptation", adaptations, ""},
           {"learning_trials", learning_trials, "trials"}};
 }
@@ -455,6 +460,7 @@ std::string measure_plural(const std::string& measure) {
   if (measure == "d_prime") return "d'";
   if (measure == "criterion") return "Criteria";
   if (measure == "deviation") return "Deviations";
+  if (measure == "aftereffect") return "Aftereffects";
   if (measure == "adaptation") return "Adaptations";
   if (measure == "learning_trials") return "Learning times";
   return measure == "pse" ? "PSEs" : "Exponents";
