@@ -84,8 +84,12 @@ Json curve_json(const Plan& plan, const PlanCurve& curve) {
 
 bool has_model_test(PlannedMeasure measure) {
   return measure != PlannedMeasure::accuracy && measure != PlannedMeasure::rating &&
-         measure != PlannedMeasure::exponent;
+         measure != PlannedMeasure::exponent && !is_of_reaching(measure);
 }
+
+constexpr std::array kContrasts = {std::pair{"conditions", PlannedContrast::conditions},
+                                   std::pair{"groups", PlannedContrast::groups},
+                                   std::pair{"zero", PlannedContrast::zero}};
 
 Json settings_json(const ThresholdPlan& plan) {
   return {
@@ -99,18 +103,25 @@ Json settings_json(const ThresholdPlan& plan) {
 }
 
 Json model_json(const ThresholdStudy& study) {
-  return {{"measure", to_string(study.measure)},
-          {"effect", study.effect},
-          {"effect_sd", study.effect_sd},
-          {"participant_sd", study.participant_sd},
-          {"weber_fraction", study.weber_fraction},
-          {"pse_sd_jnd", study.pse_sd},
-          {"accuracy", study.accuracy},
-          {"rating_sd", study.rating_sd},
-          {"number_sd", study.number_sd},
-          {"lapse", study.lapse},
-          {"reach_jnd", study.reach},
-          {"equivalence_bound", study.bound ? Json(*study.bound) : Json(nullptr)}};
+  Json out{{"measure", to_string(study.measure)},
+           {"effect", study.effect},
+           {"effect_sd", study.effect_sd},
+           {"participant_sd", study.participant_sd}};
+  if (is_of_reaching(study.measure)) {
+    out.update({{"contrast", to_string(study.contrast)},
+                {"movement_sd", study.movement_sd},
+                {"equivalence_bound", study.bound ? Json(*study.bound) : Json(nullptr)}});
+    return out;
+  }
+  out.update({{"weber_fraction", study.weber_fraction},
+              {"pse_sd_jnd", study.pse_sd},
+              {"accuracy", study.accuracy},
+              {"rating_sd", study.rating_sd},
+              {"number_sd", study.number_sd},
+              {"lapse", study.lapse},
+              {"reach_jnd", study.reach},
+              {"equivalence_bound", study.bound ? Json(*study.bound) : Json(nullptr)}});
+  return out;
 }
 
 Json point_json(const ThresholdPower& one) {
@@ -250,9 +261,10 @@ StudyModel read_times(ObjectReader& reader) {
   return model;
 }
 
-constexpr std::array kPlannedMeasures = {PlannedMeasure::jnd,       PlannedMeasure::pse,
-                                         PlannedMeasure::threshold, PlannedMeasure::accuracy,
-                                         PlannedMeasure::rating,    PlannedMeasure::exponent};
+constexpr std::array kPlannedMeasures = {
+    PlannedMeasure::jnd,       PlannedMeasure::pse,         PlannedMeasure::threshold,
+    PlannedMeasure::accuracy,  PlannedMeasure::rating,      PlannedMeasure::exponent,
+    PlannedMeasure::deviation, PlannedMeasure::aftereffect, PlannedMeasure::adaptation};
 
 ThresholdStudy read_measure(ObjectReader& reader) {
   ThresholdStudy study;
@@ -263,6 +275,12 @@ ThresholdStudy read_measure(ObjectReader& reader) {
   reader.number("effect", study.effect, {-kMostPlannedSd, kMostPlannedSd}, Presence::required);
   reader.number("effect_sd", study.effect_sd, {0, kMostPlannedSd}, Presence::required);
   reader.number("participant_sd", study.participant_sd, {0, kMostPlannedSd}, Presence::required);
+  reader.number("equivalence_bound", study.bound, {0, kMostPlannedSd});
+  if (is_of_reaching(study.measure)) {
+    reader.choice("contrast", study.contrast, kContrasts, Presence::required);
+    reader.number("movement_sd", study.movement_sd, {0, kMostPlannedSd}, Presence::required);
+    return study;
+  }
   reader.number("weber_fraction", study.weber_fraction, {0, 10, "", true}, Presence::required);
   reader.number("pse_sd_jnd", study.pse_sd, {0, kMostPlannedSd}, Presence::required);
   reader.number("accuracy", study.accuracy, {0.01, 0.99}, Presence::required);
@@ -270,7 +288,6 @@ ThresholdStudy read_measure(ObjectReader& reader) {
   reader.number("number_sd", study.number_sd, {0, kMostPlannedSd}, Presence::required);
   reader.number("lapse", study.lapse, {0, 0.5}, Presence::required);
   reader.number("reach_jnd", study.reach, {0, kMostPlannedSd}, Presence::required);
-  reader.number("equivalence_bound", study.bound, {0, kMostPlannedSd});
   return study;
 }
 
@@ -416,6 +433,13 @@ const PlanRecord::Curve* PlanRecord::curve_for(std::size_t trials) const {
   return found == curves.end() ? nullptr : &*found;
 }
 
+const char* to_string(PlannedContrast contrast) {
+  for (const auto& [name, one] : kContrasts) {
+    if (one == contrast) return name;
+  }
+  return "";
+}
+
 const char* to_string(PlannedMeasure measure) {
   switch (measure) {
     case PlannedMeasure::jnd:
@@ -429,9 +453,15 @@ const char* to_string(PlannedMeasure measure) {
     case PlannedMeasure::rating:
       return "rating";
     case PlannedMeasure::exponent:
+      return "exponent";
+    case PlannedMeasure::deviation:
+      return "deviation";
+    case PlannedMeasure::aftereffect:
+      return "aftereffect";
+    case PlannedMeasure::adaptation:
       break;
   }
-  return "exponent";
+  return "adaptation";
 }
 
 }  // namespace palpate::analysis

@@ -50,5 +50,7 @@ PlanRecord read_plan(const std::string& text, const std::string& file);
 
 /// Its name in a plan's JSON, and in named results: "jnd", "pse", ...
 const char* to_string(PlannedMeasure measure);
+/// "conditions", "groups", "zero"
+const char* to_string(PlannedContrast contrast);
 
 }  // namespace palpate::analysis

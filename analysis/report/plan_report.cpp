@@ -158,13 +158,38 @@ std::string conclusion_of(const ThresholdPlan& plan, std::size_t trials) {
 
 std::string subject_of(const ThresholdStudy& study) {
   const bool vowel =
-      study.measure == PlannedMeasure::accuracy || study.measure == PlannedMeasure::exponent;
+      study.measure == PlannedMeasure::accuracy || study.measure == PlannedMeasure::exponent ||
+      study.measure == PlannedMeasure::aftereffect || study.measure == PlannedMeasure::adaptation;
   return (vowel ? "An " : "A ") + measure_in_words(study.measure);
 }
 
 bool is_log(PlannedMeasure measure) {
   return measure == PlannedMeasure::jnd || measure == PlannedMeasure::threshold ||
          measure == PlannedMeasure::exponent;
+}
+
+bool is_in_metres(PlannedMeasure measure) {
+  return measure == PlannedMeasure::deviation || measure == PlannedMeasure::aftereffect;
+}
+
+/// Of an effect that is no ratio and no share.
+std::string in_unit(PlannedMeasure measure, double value) {
+  if (is_in_metres(measure)) return fixed(1e3 * value, 2) + " mm";
+  if (measure == PlannedMeasure::adaptation) return fixed(value, 2);
+  return fixed(value, 2) + (measure == PlannedMeasure::pse ? " JNDs" : " steps");
+}
+
+/// "with the second condition, within participants"
+std::string contrast_in_words(const ThresholdStudy& study) {
+  switch (study.contrast) {
+    case PlannedContrast::conditions:
+      return "with the second condition, within participants";
+    case PlannedContrast::groups:
+      return "in the second of two groups of participants";
+    case PlannedContrast::zero:
+      break;
+  }
+  return "than 0";
 }
 
 }  // namespace
@@ -255,9 +280,15 @@ std::string measure_in_words(PlannedMeasure measure) {
     case PlannedMeasure::rating:
       return "mean rating";
     case PlannedMeasure::exponent:
+      return "exponent";
+    case PlannedMeasure::deviation:
+      return "deviation";
+    case PlannedMeasure::aftereffect:
+      return "aftereffect";
+    case PlannedMeasure::adaptation:
       break;
   }
-  return "exponent";
+  return "adaptation";
 }
 
 std::string effect_in_words(const ThresholdStudy& study) {
@@ -269,8 +300,7 @@ std::string effect_in_words(const ThresholdStudy& study) {
   const std::string way = effect <= 0 ? " lower" : " higher";
   if (study.measure == PlannedMeasure::accuracy)
     return fixed(100 * std::abs(effect), 1) + " percentage points" + way;
-  return fixed(std::abs(effect), 2) + (study.measure == PlannedMeasure::pse ? " JNDs" : " steps") +
-         way;
+  return in_unit(study.measure, std::abs(effect)) + way;
 }
 
 std::string bound_in_words(const ThresholdStudy& study) {
@@ -280,7 +310,7 @@ std::string bound_in_words(const ThresholdStudy& study) {
     return fixed(100 * std::expm1(-bound), 1) + " to +" + fixed(100 * std::expm1(bound), 1) + " %";
   if (study.measure == PlannedMeasure::accuracy)
     return "+-" + fixed(100 * bound, 1) + " percentage points";
-  return "+-" + fixed(bound, 2) + (study.measure == PlannedMeasure::pse ? " JNDs" : " steps");
+  return "+-" + in_unit(study.measure, bound);
 }
 
 std::string method_in_words(const ThresholdStudy& study) {
@@ -295,6 +325,13 @@ std::string method_in_words(const ThresholdStudy& study) {
     case PlannedMeasure::threshold:
       return "Forced choice of two, constant stimuli, seven levels by equal ratios; the group's "
              "model of all answers.";
+    case PlannedMeasure::deviation:
+    case PlannedMeasure::aftereffect:
+    case PlannedMeasure::adaptation:
+      return std::string("Movements to targets; ") +
+             (study.contrast == PlannedContrast::groups ? "analysis of variance" : "t-test") +
+             " of participants' mean " +
+             (is_in_metres(study.measure) ? "deviations." : "adaptations.");
     case PlannedMeasure::jnd:
     case PlannedMeasure::pse:
       break;
@@ -306,7 +343,7 @@ std::string method_in_words(const ThresholdStudy& study) {
 std::string threshold_plan_text(const ThresholdPlan& plan) {
   const ThresholdStudy& study = plan.study;
   std::string text = "SIMULATED STUDIES\n\n" + subject_of(study) + " that is " +
-                     effect_in_words(study) + " with the second condition, within participants; " +
+                     effect_in_words(study) + " " + contrast_in_words(study) + "; " +
                      (study.bound ? "equivalence within " + bound_in_words(study) + " at 5 %"
                                   : "alpha " + fixed(study.alpha, 3)) +
                      "\n\n";
@@ -317,6 +354,7 @@ std::string threshold_plan_text(const ThresholdPlan& plan) {
   for (const ThresholdPower& one : plan.powers) {
     const double bias = is_log(study.measure)                       ? 100 * std::expm1(one.bias)
                         : study.measure == PlannedMeasure::accuracy ? 100 * one.bias
+                        : is_in_metres(study.measure)               ? 1e3 * one.bias
                                                                     : one.bias;
     text += "  " + pad_left(std::to_string(one.trials), 6) + "  " +
             pad_left(std::to_string(one.participants), 12) + "  " +

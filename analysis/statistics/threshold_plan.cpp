@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "analysis/statistics/between_groups.h"
 #include "analysis/statistics/describe.h"
 #include "analysis/statistics/group_psychometric.h"
 #include "analysis/statistics/group_simulation.h"
@@ -91,7 +92,7 @@ PlannedOutcome outcome_of_functions(const ThresholdStudy& study, const GroupStud
   return out;
 }
 
-// Shares, ratings and exponents: the t-test of participants' differences.
+// Shares, ratings, exponents and movements: the t-test of participants' differences.
 
 PlannedOutcome outcome_of_differences(const ThresholdStudy& study,
                                       const std::vector<double>& differences) {
@@ -171,9 +172,53 @@ double exponent_difference(const ThresholdStudy& study, std::size_t trials, Rand
   return difference;
 }
 
+/// A participant's difference between the conditions; without two of them the mean over the trials.
+/// \param group  of the participant
+double movement_figure(const ThresholdStudy& study, std::size_t trials, std::size_t group,
+                       Random& random) {
+  const bool paired = study.contrast == PlannedContrast::conditions;
+  const double own = (paired ? study.effect_sd : study.participant_sd) * random.normal();
+  const double effect = study.contrast == PlannedContrast::groups && group == 0 ? 0 : study.effect;
+  const double means = paired ? 2 : 1;  // of which the figure is made
+  const double error = study.movement_sd * std::sqrt(means / static_cast<double>(trials));
+  return effect + own + error * random.normal();
+}
+
+/// As the analysis of variance of the group of participants.
+PlannedOutcome outcome_of_groups(const ThresholdStudy& study, const std::vector<double>& figures) {
+  std::vector<GroupedFigures> participants;
+  for (std::size_t i = 0; i < figures.size(); ++i)
+    participants.push_back({std::to_string(i), planned_group(i + 1), {figures[i]}});
+  const BetweenGroups found = compare_groups(participants, 2, {{"renderer", 1}});
+  PlannedOutcome out;
+  for (const GroupContrast& one : found.contrasts) {
+    if (one.estimate) out.estimate = *one.estimate;
+  }
+  for (const GroupEffect& one : found.anova.effects) {
+    if (one.name != "group" || !one.p) continue;
+    out.determined = true;
+    out.found = *one.p < study.alpha;
+  }
+  return out;
+}
+
 bool is_of_differences(PlannedMeasure measure) {
   return measure == PlannedMeasure::accuracy || measure == PlannedMeasure::rating ||
-         measure == PlannedMeasure::exponent;
+         measure == PlannedMeasure::exponent || is_of_reaching(measure);
+}
+
+double difference_of(const ThresholdStudy& study, double shift, std::size_t trials,
+                     std::size_t number, Random& random) {
+  switch (study.measure) {
+    case PlannedMeasure::accuracy:
+      return share_difference(study, shift, trials, random);
+    case PlannedMeasure::rating:
+      return rating_difference(study, trials, random);
+    case PlannedMeasure::exponent:
+      return exponent_difference(study, trials, random);
+    default:
+      return movement_figure(study, trials, planned_group(number), random);
+  }
 }
 
 /// Outcomes of a study for each number of participants.
@@ -188,14 +233,15 @@ std::vector<PlannedOutcome> outcomes_of(const ThresholdStudy& study, std::size_t
     std::vector<double> differences;
     for (std::size_t i = 0; i < most; ++i) {
       Random random(seed, {0x7a, trials, number, i});
-      differences.push_back(of_shares ? share_difference(study, shift, trials, random)
-                            : study.measure == PlannedMeasure::rating
-                                ? rating_difference(study, trials, random)
-                                : exponent_difference(study, trials, random));
+      differences.push_back(difference_of(study, shift, trials, i + 1, random));
     }
-    for (const std::size_t n : participants)
-      out.push_back(outcome_of_differences(
-          study, {differences.begin(), differences.begin() + static_cast<std::ptrdiff_t>(n)}));
+    for (const std::size_t n : participants) {
+      const std::vector<double> some(differences.begin(),
+                                     differences.begin() + static_cast<std::ptrdiff_t>(n));
+      out.push_back(study.contrast == PlannedContrast::groups
+                        ? outcome_of_groups(study, some)
+                        : outcome_of_differences(study, some));
+    }
     return out;
   }
   GroupStudy group = group_study_of(study, trials);
@@ -236,6 +282,11 @@ ThresholdPower power_of(const ThresholdStudy& study, std::size_t trials, std::si
 }
 
 }  // namespace
+
+bool is_of_reaching(PlannedMeasure measure) {
+  return measure == PlannedMeasure::deviation || measure == PlannedMeasure::aftereffect ||
+         measure == PlannedMeasure::adaptation;
+}
 
 double log_odds_effect(const ThresholdStudy& study) {
   const double first = logit(study.accuracy);

@@ -37,9 +37,12 @@ namespace {
 struct ThresholdOptions {
   /// Of one of kMeasureOptions.
   double jnd = 0, pse = 0, threshold = 0, accuracy_points = 0, rating = 0, exponent = 0;
+  double deviation = 0, aftereffect = 0, adaptation = 0;
   std::string weber = "0.1";  ///< with --cues two
   double participant_sd = 0.3, effect_sd = 0.2, pse_sd = 0.5, reach = 2.5;
   double accuracy = 0.8, equivalence = 0;
+  std::string contrast;     ///< as analysis::to_string
+  double movement_sd = -1;  ///< of reaching; < 0: the measure's default
 };
 
 /// Each plans another measure than times.
@@ -54,7 +57,12 @@ constexpr MeasureOption kMeasureOptions[] = {
     {"threshold-effect", analysis::PlannedMeasure::threshold, &ThresholdOptions::threshold},
     {"accuracy-effect", analysis::PlannedMeasure::accuracy, &ThresholdOptions::accuracy_points},
     {"rating-effect", analysis::PlannedMeasure::rating, &ThresholdOptions::rating},
-    {"exponent-effect", analysis::PlannedMeasure::exponent, &ThresholdOptions::exponent}};
+    {"exponent-effect", analysis::PlannedMeasure::exponent, &ThresholdOptions::exponent},
+    {"deviation-effect", analysis::PlannedMeasure::deviation, &ThresholdOptions::deviation},
+    {"aftereffect-effect", analysis::PlannedMeasure::aftereffect, &ThresholdOptions::aftereffect},
+    {"adaptation-effect", analysis::PlannedMeasure::adaptation, &ThresholdOptions::adaptation}};
+
+constexpr double kMillimetre = 1e-3;
 
 namespace po = boost::program_options;
 
@@ -179,7 +187,12 @@ void require(bool right, const char* option, const char* expected) {
   if (!right) throw UsageError(std::string("--") + option + ": expected " + expected);
 }
 
-/// A percentage as a log ratio, points as a share, others as they are.
+bool is_in_millimetres(analysis::PlannedMeasure measure) {
+  return measure == analysis::PlannedMeasure::deviation ||
+         measure == analysis::PlannedMeasure::aftereffect;
+}
+
+/// A percentage as a log ratio, points as a share, millimetres in m, others as they are.
 double on_scale(analysis::PlannedMeasure measure, double effect) {
   switch (measure) {
     case analysis::PlannedMeasure::jnd:
@@ -188,8 +201,12 @@ double on_scale(analysis::PlannedMeasure measure, double effect) {
       return std::log1p(-effect / 100);
     case analysis::PlannedMeasure::accuracy:
       return effect / 100;
+    case analysis::PlannedMeasure::deviation:
+    case analysis::PlannedMeasure::aftereffect:
+      return effect * kMillimetre;
     case analysis::PlannedMeasure::pse:
     case analysis::PlannedMeasure::rating:
+    case analysis::PlannedMeasure::adaptation:
       break;
   }
   return effect;
@@ -210,6 +227,11 @@ void require_effect(const MeasureOption& option, double effect, double accuracy)
       return require(within(-5, 5), option.name, "-5 to 5 JNDs");
     case analysis::PlannedMeasure::rating:
       return require(within(-6, 6), option.name, "-6 to 6 steps");
+    case analysis::PlannedMeasure::deviation:
+    case analysis::PlannedMeasure::aftereffect:
+      return require(within(-100, 100), option.name, "-100 to 100 mm");
+    case analysis::PlannedMeasure::adaptation:
+      return require(within(-2, 2), option.name, "-2 to 2");
   }
 }
 
@@ -219,6 +241,32 @@ double number_of(const std::string& text) {
   const char* const end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data(), end, value);
   return error == std::errc() && stop == end ? value : std::nan("");
+}
+
+/// Puts what a plan of movements to targets has beside the effect and its bound. Without a pilot
+/// the standard deviations are guesses.
+void put_reaching(const ThresholdOptions& options, const po::variables_map& values,
+                  analysis::ThresholdStudy& study) {
+  constexpr double kDeviationSd = 3, kMovementSd = 6;  // mm
+  constexpr double kAdaptationSd = 0.15, kClampedSd = 0.3;
+  const bool lengths = is_in_millimetres(study.measure);
+  const double unit = lengths ? kMillimetre : 1, most = lengths ? 100 : 2;
+  const double usual = lengths ? kDeviationSd : kAdaptationSd;
+  const auto put = [&](const char* option, double given, double otherwise, double& out) {
+    const bool own = values.count(option) != 0 && !values[option].defaulted();
+    require(!own || (given >= 0 && given <= most), option, lengths ? "0 to 100 mm" : "0 to 2");
+    out = unit * (own ? given : otherwise);
+  };
+  put("jnd-sd", options.participant_sd, usual, study.participant_sd);
+  put("jnd-effect-sd", options.effect_sd, usual, study.effect_sd);
+  put("movement-sd", options.movement_sd, lengths ? kMovementSd : kClampedSd, study.movement_sd);
+  for (const auto contrast : {analysis::PlannedContrast::conditions,
+                              analysis::PlannedContrast::groups, analysis::PlannedContrast::zero}) {
+    if (options.contrast == to_string(contrast)) study.contrast = contrast;
+  }
+  require(options.contrast == to_string(study.contrast), "contrast", "conditions, groups or zero");
+  require(!(study.bound && study.contrast == analysis::PlannedContrast::groups), "equivalence",
+          "conditions or zero as --contrast: groups are compared by an analysis of variance");
 }
 
 analysis::ThresholdStudy study_of(const ThresholdOptions& thresholds, const MeasureOption& measure,
@@ -231,8 +279,11 @@ analysis::ThresholdStudy study_of(const ThresholdOptions& thresholds, const Meas
   require_effect(measure, effect, thresholds.accuracy);
   const double weber = number_of(thresholds.weber);
   require(within(weber, 0.001, 1), "weber", "a JND / standard from 0.001 to 1");
-  require(within(thresholds.participant_sd, 0, 2), "jnd-sd", "0 to 2");
-  require(within(thresholds.effect_sd, 0, 2), "jnd-effect-sd", "0 to 2");
+  const bool reaching = is_of_reaching(measure.measure);
+  if (!reaching) {
+    require(within(thresholds.participant_sd, 0, 2), "jnd-sd", "0 to 2");
+    require(within(thresholds.effect_sd, 0, 2), "jnd-effect-sd", "0 to 2");
+  }
   require(within(thresholds.pse_sd, 0, 5), "pse-sd", "0 to 5 JNDs");
   require(within(thresholds.reach, 0.5, 10), "reach", "0.5 to 10 JNDs");
   require(within(options.alpha, 1e-6, 0.5), "alpha", "0.000001 to 0.5");
@@ -253,6 +304,13 @@ analysis::ThresholdStudy study_of(const ThresholdOptions& thresholds, const Meas
     require(thresholds.equivalence > 0 && thresholds.equivalence < 400, "equivalence",
             "a bound above 0, in the unit of the effect");
     study.bound = std::abs(on_scale(measure.measure, -thresholds.equivalence));
+  }
+  if (reaching) put_reaching(thresholds, values, study);
+  for (const char* const option : {"movement-sd", "contrast"}) {
+    if (!reaching && values.count(option) != 0 && !values[option].defaulted())
+      throw UsageError(std::string("--") + option +
+                       ": goes with --deviation-effect, --aftereffect-effect and "
+                       "--adaptation-effect");
   }
   study.pse_sd = thresholds.pse_sd;
   study.reach = thresholds.reach;
@@ -285,6 +343,20 @@ void add_threshold_options(CommandLine& line, ThresholdOptions& options) {
       "of mean ratings on seven steps: how much higher with the second");
   add("exponent-effect", po::value(&options.exponent)->value_name("PERCENT"),
       "of exponents of magnitude estimation: how much smaller with the second");
+  add("deviation-effect", po::value(&options.deviation)->value_name("MM"),
+      "of movements to targets: how much larger the mean deviation with the field is, mm");
+  add("aftereffect-effect", po::value(&options.aftereffect)->value_name("MM"),
+      "the same in catch trials");
+  add("adaptation-effect", po::value(&options.adaptation)->value_name("DIFFERENCE"),
+      "of movements to targets: how much higher the mean adaptation in clamp trials is");
+  add("contrast",
+      po::value(&options.contrast)
+          ->default_value("conditions")
+          ->value_name("conditions|groups|zero"),
+      "of movements: with the second condition; in the second of two groups, whose participants "
+      "--participants counts together; or than 0");
+  add("movement-sd", po::value(&options.movement_sd)->value_name("SD"),
+      "of single movements: mm, 6 by default; adaptations 0.3");
   add("equivalence", po::value(&options.equivalence)->value_name("BOUND"),
       "show equivalence within this bound instead, in the unit of the effect; with an effect of 0");
   add("accuracy", po::value(&options.accuracy)->default_value(0.8, "0.8")->value_name("SHARE"),
@@ -296,9 +368,11 @@ void add_threshold_options(CommandLine& line, ThresholdOptions& options) {
       "plan a study of seen and felt cues: gain over the better cue, and what --participants "
       "people (12) with --trials at a level (30) can show of it");
   add("jnd-sd", po::value(&options.participant_sd)->default_value(0.3, "0.3")->value_name("SD"),
-      "of participants' log JND, threshold or exponent; of log odds and ratings 0.7");
+      "of participants' log JND, threshold or exponent; of log odds and ratings 0.7, deviations "
+      "3 mm, adaptations 0.15");
   add("jnd-effect-sd", po::value(&options.effect_sd)->default_value(0.2, "0.2")->value_name("SD"),
-      "of participants' differences: log ratios, JNDs; of log odds and ratings 0.5");
+      "of participants' differences: log ratios, JNDs; of log odds and ratings 0.5, deviations "
+      "3 mm, adaptations 0.15");
   add("pse-sd", po::value(&options.pse_sd)->default_value(0.5, "0.5")->value_name("SD"),
       "of participants' PSE, in JNDs");
   add("reach", po::value(&options.reach)->default_value(2.5, "2.5")->value_name("JNDS"),
@@ -363,7 +437,9 @@ void plan_thresholds_of(const ThresholdOptions& thresholds, const MeasureOption&
   analysis::ThresholdPlanSettings settings;
   PlanOptions own = options;
   const bool of_ratings = measure.measure == analysis::PlannedMeasure::rating;
-  if (values["trials"].defaulted()) own.trials = of_ratings ? "2,4" : "84,168";
+  const bool of_reaching = is_of_reaching(measure.measure);
+  if (values["trials"].defaulted())
+    own.trials = of_ratings ? "2,4" : of_reaching ? "10,50" : "84,168";
   if (values["participants"].defaulted()) own.participants = "4-24";
   const analysis::PlanSettings asked = settings_of(own, values);
   settings.trials = asked.trials;
@@ -540,8 +616,9 @@ int plan_command(const std::vector<std::string>& args) {
       R"(palpate plan ((--db FILE | --csv FILE) [--protocol NAME] | --gain-sd SD --residual-sd SD)
            [--effect SHAPE=PERCENT,...]
        palpate plan (--jnd-effect PERCENT | --pse-effect JNDS | --threshold-effect PERCENT |
-           --accuracy-effect POINTS | --rating-effect STEPS | --exponent-effect PERCENT)
-           [--equivalence BOUND]
+           --accuracy-effect POINTS | --rating-effect STEPS | --exponent-effect PERCENT |
+           --deviation-effect MM | --aftereffect-effect MM | --adaptation-effect DIFFERENCE)
+           [--equivalence BOUND] [--contrast conditions|groups|zero]
        palpate plan --groups N (--effect-between PERCENT | --effect-interaction PERCENT) ...
        palpate plan --cues --weber FELT,SEEN [--participants N] [--trials N] [--studies N]
        palpate plan --coverage [--studies N] [--seed S])";
@@ -554,6 +631,7 @@ int plan_command(const std::vector<std::string>& args) {
   palpate plan --gain-sd 0.15 --residual-sd 0.5 --effect cone=15 --participants 4-60 \
       --trials 20,40 --json plan.json --figure power.svg
   palpate plan --jnd-effect 20 --weber 0.1 --trials 70,140 --participants 6-30   (thresholds)
+  palpate plan --adaptation-effect 0.2 --contrast groups --trials 10   (reaching)
   palpate plan --groups 2 --effect-between 20 --gain-sd 0.15 --residual-sd 0.5 --participants 4-60
   palpate plan --cues --weber 0.06,0.09 --participants 12 --trials 30
   palpate plan --coverage --studies 500 --seed 1)";
@@ -605,7 +683,8 @@ int plan_command(const std::vector<std::string>& args) {
   if (values->count("equivalence"))
     throw UsageError(
         "--equivalence: expected one of --jnd-effect, --pse-effect, --threshold-effect, "
-        "--accuracy-effect, --rating-effect and --exponent-effect");
+        "--accuracy-effect, --rating-effect, --exponent-effect, --deviation-effect, "
+        "--aftereffect-effect and --adaptation-effect");
   analysis::PlanSettings settings = settings_of(options, *values);
   analysis::Pilot pilot = starting_point(options, *values);
   analysis::StudyModel model = model_of(pilot, options, *values);

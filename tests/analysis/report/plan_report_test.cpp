@@ -44,9 +44,12 @@ ThresholdPlan a_plan_of(PlannedMeasure measure) {
 TEST(PlanRecordTest, KeepsEachMeasure) {
   for (const PlannedMeasure measure :
        {PlannedMeasure::jnd, PlannedMeasure::pse, PlannedMeasure::threshold,
-        PlannedMeasure::accuracy, PlannedMeasure::rating, PlannedMeasure::exponent}) {
+        PlannedMeasure::accuracy, PlannedMeasure::rating, PlannedMeasure::exponent,
+        PlannedMeasure::deviation, PlannedMeasure::aftereffect, PlannedMeasure::adaptation}) {
     ThresholdPlan plan = a_plan_of(measure);
     if (measure == PlannedMeasure::rating) plan.study.bound = 0.5;
+    if (measure == PlannedMeasure::adaptation) plan.study.contrast = PlannedContrast::groups;
+    if (measure == PlannedMeasure::adaptation) plan.study.movement_sd = 0.3;
     const PlanRecord read = read_plan(threshold_plan_json(plan), "plan.json");
     ASSERT_NE(read.measure(), nullptr);
     EXPECT_EQ(read.times(), nullptr);
@@ -54,6 +57,8 @@ TEST(PlanRecordTest, KeepsEachMeasure) {
     EXPECT_EQ(read.measure()->effect, -0.25);
     EXPECT_EQ(read.measure()->participant_sd, 0.75);
     EXPECT_EQ(read.measure()->bound, plan.study.bound);
+    EXPECT_EQ(read.measure()->contrast, plan.study.contrast);
+    EXPECT_EQ(read.measure()->movement_sd, plan.study.movement_sd);
     ASSERT_NE(read.curve_for(84), nullptr);
     EXPECT_EQ(read.curve_for(84)->participants, 12U);
     EXPECT_EQ(read.curve_for(84)->power.at(6), 0.25);

@@ -5,6 +5,8 @@
 
 #include <gtest/gtest.h>
 
+#include <boost/math/distributions/non_central_t.hpp>
+#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -136,6 +138,66 @@ TEST(ThresholdPlan, EquivalenceNeedsAWideBound) {
   const double narrow = plan_thresholds(study, asked(500, {6}, 400)).powers[0].power;
   EXPECT_GT(wide, 0.8);
   EXPECT_LT(narrow, 0.1);
+}
+
+/// Power in the right direction of a two-sided t test at 5 %. \param noncentrality  of t
+double power_of_t(double noncentrality, double df) {
+  const double critical = quantile(boost::math::students_t(df), 0.975);
+  return cdf(complement(boost::math::non_central_t(df, std::abs(noncentrality)), critical));
+}
+
+ThresholdStudy of_movements(PlannedMeasure measure, PlannedContrast contrast) {
+  ThresholdStudy study;
+  study.measure = measure;
+  study.contrast = contrast;
+  study.effect = measure == PlannedMeasure::adaptation ? 0.2 : -0.003;
+  study.effect_sd = 0.8 * std::abs(study.effect);
+  study.participant_sd = 1.1 * std::abs(study.effect);
+  study.movement_sd = 2 * std::abs(study.effect);
+  return study;
+}
+
+constexpr PlannedContrast kContrasts[] = {PlannedContrast::conditions, PlannedContrast::groups,
+                                          PlannedContrast::zero};
+
+// The power of t, of which the variance of a participant's figure has a closed form.
+TEST(ThresholdPlan, MovementsHaveThePowerOfT) {
+  constexpr std::size_t kPeople = 14, kTrials = 8, kStudies = 2000;
+  for (const PlannedMeasure measure :
+       {PlannedMeasure::deviation, PlannedMeasure::aftereffect, PlannedMeasure::adaptation}) {
+    for (const PlannedContrast contrast : kContrasts) {
+      const ThresholdStudy study = of_movements(measure, contrast);
+      const bool paired = contrast == PlannedContrast::conditions;
+      const bool groups = contrast == PlannedContrast::groups;
+      const double own = paired ? study.effect_sd : study.participant_sd;
+      const double figure_sd = std::hypot(
+          own, study.movement_sd * std::sqrt((paired ? 2.0 : 1.0) / static_cast<double>(kTrials)));
+      const double se = figure_sd * std::sqrt((groups ? 4.0 : 1.0) / static_cast<double>(kPeople));
+      const double expected =
+          power_of_t(study.effect / se, static_cast<double>(kPeople - (groups ? 2 : 1)));
+      const ThresholdPower found =
+          plan_thresholds(study, asked(kTrials, {kPeople}, kStudies)).powers[0];
+      EXPECT_NEAR(found.power, expected, 4 * std::sqrt(expected * (1 - expected) / kStudies))
+          << static_cast<int>(measure) << " " << static_cast<int>(contrast);
+      EXPECT_NEAR(found.bias, 0, 4 * se / std::sqrt(kStudies));
+      EXPECT_EQ(found.undetermined, 0U);
+    }
+  }
+}
+
+// Without an effect p is uniform, so a share of alpha finds one, at any alpha.
+TEST(ThresholdPlan, MovementsWithoutEffectHaveUniformP) {
+  constexpr std::size_t kStudies = 2000;
+  for (const PlannedContrast contrast : kContrasts) {
+    ThresholdStudy study = of_movements(PlannedMeasure::adaptation, contrast);
+    study.effect = 0;
+    for (const double alpha : {0.01, 0.05, 0.2, 0.5}) {
+      study.alpha = alpha;
+      const double power = plan_thresholds(study, asked(5, {9}, kStudies)).powers[0].power;
+      EXPECT_NEAR(power, alpha, 4 * std::sqrt(alpha * (1 - alpha) / kStudies))
+          << static_cast<int>(contrast);
+    }
+  }
 }
 
 }  // namespace
