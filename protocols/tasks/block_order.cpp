@@ -155,6 +155,14 @@ long long most_trials_of(const TaskBlock& block) {
   return with_catch_trials(block, trials);
 }
 
+long long reaches_of_track(const TaskBlock& block, ReachTrial kind) {
+  const long long all = repetitions_of_track(block);
+  const long long clamps = std::llround(block.reaching->clamp_share * static_cast<double>(all));
+  const long long catches = std::llround(block.reaching->catch_share * static_cast<double>(all));
+  if (kind == ReachTrial::clamp) return clamps;
+  return kind == ReachTrial::none ? catches : all - clamps - catches;
+}
+
 long long expected_trials_of(const TaskBlock& block) {
   if (!is_adaptive(block)) return most_trials_of(block);
   double trials = 0;

@@ -29,6 +29,8 @@ const ProcedureSpec* procedure_of(const TaskBlock& block, const Trial& trial);
 long long most_trials_of(const TaskBlock& block);
 /// The trials of a participant that adaptive blocks usually take.
 long long expected_trials_of(const TaskBlock& block);
+/// Movements of a kind to all targets, with one stimulus and renderer. \pre a block of reaching
+long long reaches_of_track(const TaskBlock& block, ReachTrial kind);
 /// An adaptive block ends after this many unanswered trials, whose levels are repeated: nobody is
 /// there. A quarter of most_trials_of, at least 10.
 std::size_t most_unanswered(const TaskBlock& block);

@@ -30,9 +30,8 @@ struct Category {
 std::array<int, 3> counts_of_reaches(const TaskBlock& block, std::size_t target) {
   const ReachingSpec& reaching = *block.reaching;
   const auto targets = static_cast<long long>(reaching.targets.size());
-  const auto all = static_cast<double>(repetitions_of_track(block));
-  const long long clamps = std::llround(reaching.clamp_share * all);
-  const long long catches = std::llround(reaching.catch_share * all);
+  const long long clamps = reaches_of_track(block, ReachTrial::clamp);
+  const long long catches = reaches_of_track(block, ReachTrial::none);
   const auto place = static_cast<long long>(target);
   const auto clamped = static_cast<int>(clamps / targets + (place < clamps % targets ? 1 : 0));
   const auto caught =

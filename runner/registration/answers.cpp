@@ -50,6 +50,38 @@ std::string StudyAnswers::contrast() const {
   return study != nullptr && study->bound ? "a difference as large as the bound" : "no effect";
 }
 
+namespace {
+
+/// "with the second condition the JND is ..."
+std::string effect_of(const analysis::ThresholdStudy& study, const protocols::Protocol& protocol) {
+  const std::string measure = analysis::measure_in_words(study.measure);
+  const std::string is = " is " + analysis::effect_in_words(study);
+  switch (study.contrast) {
+    case analysis::PlannedContrast::conditions:
+      return "with the second condition the " + measure + is;
+    case analysis::PlannedContrast::groups:
+      return "in group " + protocol.groups.names.back() + " the " + measure + is +
+             " than in group " + protocol.groups.names.front();
+    case analysis::PlannedContrast::zero:
+      break;
+  }
+  return "the " + measure + is + " than 0";
+}
+
+/// With their units.
+std::string deviations_in_words(const analysis::ThresholdStudy& study) {
+  const std::string people = "Standard deviations: participants " + plain(study.participant_sd) +
+                             ", their differences between the conditions " + plain(study.effect_sd);
+  if (!analysis::is_of_reaching(study.measure))
+    return people +
+           ", on the scale of the plan (natural logarithms of JNDs, thresholds and exponents; PSEs "
+           "in JNDs; log odds of shares; ratings in steps).";
+  return people + ", single movements " + plain(study.movement_sd) +
+         (study.measure == analysis::PlannedMeasure::adaptation ? "." : " (m).");
+}
+
+}  // namespace
+
 std::vector<Paragraph> plan_of_measure(const Registration& made) {
   const analysis::PlanRecord& plan = made.plan;
   const analysis::ThresholdStudy& study = *plan.measure();
@@ -58,22 +90,23 @@ std::vector<Paragraph> plan_of_measure(const Registration& made) {
                      std::to_string(plan.studies) +
                      " studies for each number of participants and " +
                      std::to_string(fitting_curve(made.protocol, plan).trials) +
-                     " trials of each with each condition. " + analysis::method_in_words(study) +
+                     (study.contrast == analysis::PlannedContrast::conditions
+                          ? " trials of each with each condition. "
+                          : " trials of each that give the measure. ") +
+                     analysis::method_in_words(study) +
                      (study.bound ? " Two one-sided tests at 5 %."
                                   : " Alpha " + plain(plan.alpha) + ", two-sided.")));
   const std::string measure = analysis::measure_in_words(study.measure);
   if (study.bound) {
     out.push_back(item("To be shown: the " + measure +
-                       " is the same with both conditions, within " +
+                       (study.contrast == analysis::PlannedContrast::zero
+                            ? " is 0, within "
+                            : " is the same with both conditions, within ") +
                        analysis::bound_in_words(study) + "."));
   } else {
-    out.push_back(item("Effect to be found: with the second condition the " + measure + " is " +
-                       analysis::effect_in_words(study) + "."));
+    out.push_back(item("Effect to be found: " + effect_of(study, made.protocol) + "."));
   }
-  out.push_back(item("Standard deviations: participants " + plain(study.participant_sd) +
-                     ", their differences between the conditions " + plain(study.effect_sd) +
-                     ", on the scale of the plan (natural logarithms of JNDs, thresholds and "
-                     "exponents; PSEs in JNDs; log odds of shares; ratings in steps)."));
+  out.push_back(item(deviations_in_words(study)));
   for (const std::string& note : plan.notes) out.push_back(item(note));
   return out;
 }

@@ -182,7 +182,8 @@ study::ShownTrial shown_trial(const TrialFields& of, std::size_t row, int sessio
                   static_cast<int>(of.count(row, "track")),
                   level_of(of, row),
                   of.flag(row, "catch_trial"),
-                  comparison.empty() ? 0 : static_cast<int>(of.count(row, "comparison_interval"))};
+                  comparison.empty() ? 0 : static_cast<int>(of.count(row, "comparison_interval")),
+                  of.has("reach_kind") ? of.text(row, "reach_kind") : ""};
   out.outcome.success = of.flag(row, "success");
   out.outcome.level = level_of(of, row);
   return out;

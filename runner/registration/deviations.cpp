@@ -53,7 +53,13 @@ study::ShownTrial shown_trial(const data::TrialRecord& record) {
   out.outcome = session::outcome_of(record);
   const data::TaskRecord& task = record.task;
   if (!task.of_block()) return out;
-  out.row.task = {record.block, task.block_name, task.track, task.level, task.catch_trial, 0};
+  out.row.task = {record.block,
+                  task.block_name,
+                  task.track,
+                  task.level,
+                  task.catch_trial,
+                  0,
+                  task.reach ? task.reach->kind : ""};
   for (std::size_t i = 0; task.task == "compare" && i < task.intervals.size(); ++i) {
     if (!task.intervals[i].standard) out.row.task->comparison = static_cast<int>(i) + 1;
   }
@@ -392,6 +398,77 @@ CheckPoint of_trials(const Registration& registered, const StudyData& study) {
   return out;
 }
 
+/// "86 field, 4 catch, 10 clamp"
+using Movements = std::map<std::string, std::size_t>;
+
+std::string movements_text(const Movements& counts) {
+  std::string out;
+  for (const auto kind :
+       {protocols::ReachTrial::field, protocols::ReachTrial::none, protocols::ReachTrial::clamp}) {
+    const auto found = counts.find(protocols::to_string(kind));
+    if (found != counts.end())
+      out += (out.empty() ? "" : ", ") + std::to_string(found->second) + " " + found->first;
+  }
+  return out.empty() ? "none" : out;
+}
+
+/// By block. \param rows  of trials that count
+std::map<std::string, Movements> movements_of(const std::vector<study::OrderRow>& rows) {
+  std::map<std::string, Movements> out;
+  for (const study::OrderRow& row : rows) {
+    if (row.task && !row.task->reach.empty()) ++out[row.task->name][row.task->reach];
+  }
+  return out;
+}
+
+/// Movements with the field, without it and along a channel: their shares are what the participants
+/// learn from, and what is measured.
+CheckPoint of_movements(const Registration& registered, const StudyData& study) {
+  CheckPoint out{"movements", "Movements to targets", Finding::as_registered, ""};
+  std::map<std::string, Movements> all;
+  for (const StudyParticipant& one : study.participants) {
+    const int number = std::max(1, one.person.enrolled_number);
+    const protocols::Protocol& protocol = protocols::protocol_of(registered.protocol, number);
+    auto shown = movements_of(rows_that_count(one.shown));
+    for (const auto& [block, counts] : shown) {
+      for (const auto& [kind, n] : counts) all[block][kind] += n;
+    }
+    for (const protocols::TaskBlock& block : protocol.blocks) {
+      if (!block.reaching || block.practice) continue;
+      Movements wanted;
+      for (const auto kind : {protocols::ReachTrial::field, protocols::ReachTrial::none,
+                              protocols::ReachTrial::clamp}) {
+        const long long n = protocols::reaches_of_track(block, kind) *
+                            static_cast<long long>(block.stimuli.size() * block.renderers.size());
+        if (n > 0) wanted[protocols::to_string(kind)] = static_cast<std::size_t>(n);
+      }
+      if (!block.cell && shown[block.name] != wanted)
+        out.evidence.push_back(one.person.code + ", block " + block.name + ": " +
+                               movements_text(shown[block.name]) + "; registered " +
+                               movements_text(wanted));
+    }
+  }
+  std::string words;
+  for (const auto& [block, counts] : all)
+    words += (words.empty() ? "" : "; ") + block + ": " + movements_text(counts);
+  out.sentence = out.evidence.empty()
+                     ? "Every participant made the registered movements with the field, without it "
+                       "and along a channel."
+                     : "Other movements with the field, without it and along a channel were made "
+                       "than registered.";
+  if (!words.empty()) out.sentence += " Of all: " + words + ".";
+  if (out.evidence.empty()) return out;
+  out.finding = Finding::deviation;
+  cut(out.evidence);
+  return out;
+}
+
+bool has_movements(const protocols::Protocol& protocol) {
+  return std::ranges::any_of(protocol.blocks, [](const protocols::TaskBlock& block) {
+    return block.reaching && !block.practice;
+  });
+}
+
 /// The version of a simulated participant; "" for changed settings.
 std::string version_of(const std::string& observer_sha256) {
   for (const int version : participants::participant_versions()) {
@@ -609,10 +686,16 @@ std::string keep_study_named(const std::string& name, StudyData& study) {
 
 std::vector<CheckPoint> points_of_trials(const Registration& registered, const std::string& folder,
                                          const StudyData& study, const ReportedAnalysis& reported) {
-  return {of_registration(registered, folder), of_digest(registered, reported.digest),
-          of_order(registered, study),         of_participants(registered, study),
-          of_trials(registered, study),        of_people(study),
-          of_exclusion(registered, reported),  of_alpha(registered, reported)};
+  std::vector<CheckPoint> out = {
+      of_registration(registered, folder), of_digest(registered, reported.digest),
+      of_order(registered, study),         of_participants(registered, study),
+      of_trials(registered, study),        of_people(study),
+      of_exclusion(registered, reported),  of_alpha(registered, reported)};
+  if (has_movements(registered.protocol)) {
+    const auto trials = std::ranges::find(out, "trials", &CheckPoint::id);
+    out.insert(trials + 1, of_movements(registered, study));
+  }
+  return out;
 }
 
 ReportedAnalysis read_reported(const std::string& text, const std::string& file) {

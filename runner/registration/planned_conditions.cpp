@@ -18,12 +18,44 @@
 namespace palpate::runner::registration {
 namespace {
 
+using analysis::PlannedContrast;
 using analysis::PlannedMeasure;
 using protocols::Protocol;
 using protocols::TaskBlock;
 using protocols::TaskKind;
 
 constexpr const char* kTime = "time";
+
+/// Movements with a stimulus and a renderer that give the measure.
+std::size_t movements_of(const TaskBlock& block, PlannedMeasure measure) {
+  using protocols::ReachTrial;
+  const ReachTrial kind = measure == PlannedMeasure::adaptation    ? ReachTrial::clamp
+                          : measure == PlannedMeasure::aftereffect ? ReachTrial::none
+                                                                   : ReachTrial::field;
+  return static_cast<std::size_t>(protocols::reaches_of_track(block, kind));
+}
+
+bool exerts_force(const stimuli::FieldSpec& field) {
+  return field.force != Vec3(0) || field.stiffness > 0 || field.damping != Mat3(0) ||
+         field.amplitude > 0;
+}
+
+/// Whether a channel shows what the hand has learnt: there is something to learn.
+bool has_field(const Protocol& protocol, const TaskBlock& block) {
+  return std::ranges::any_of(block.stimuli, [&](int stimulus) {
+    const auto& fields = protocol.stimuli[static_cast<std::size_t>(stimulus)].object.fields;
+    return std::ranges::any_of(fields, exerts_force);
+  });
+}
+
+std::vector<std::string> measures_of_reaching(const Protocol& protocol, const TaskBlock& block) {
+  std::vector<std::string> out = {to_string(PlannedMeasure::deviation)};
+  if (movements_of(block, PlannedMeasure::aftereffect) > 0)
+    out.emplace_back(to_string(PlannedMeasure::aftereffect));
+  if (movements_of(block, PlannedMeasure::adaptation) > 0 && has_field(protocol, block))
+    out.emplace_back(to_string(PlannedMeasure::adaptation));
+  return out;
+}
 
 /// The measures that the analysis finds in a block, as plans name them.
 std::vector<std::string> measures_of(const Protocol& protocol, const TaskBlock& block) {
@@ -44,8 +76,9 @@ std::vector<std::string> measures_of(const Protocol& protocol, const TaskBlock& 
       const bool numbers = block.level && block.answers.empty();
       return {to_string(numbers ? PlannedMeasure::exponent : PlannedMeasure::rating)};
     }
-    case TaskKind::external:
     case TaskKind::reach:
+      return measures_of_reaching(protocol, block);
+    case TaskKind::external:
       break;
   }
   return {};
@@ -80,6 +113,10 @@ std::size_t trials_of_identification(const Protocol& protocol, const std::vector
 
 bool is_of_identification(const analysis::PlanRecord& plan) {
   return plan.measure() == nullptr || plan.measure()->measure == PlannedMeasure::accuracy;
+}
+
+bool is_of_reaching(const analysis::PlanRecord& plan) {
+  return plan.measure() != nullptr && analysis::is_of_reaching(plan.measure()->measure);
 }
 
 std::string option_of(const std::string& measure) {
@@ -141,7 +178,9 @@ std::size_t trials_of_cell(const Protocol& protocol, const analysis::PlanRecord&
     return trials_of_identification(protocol, blocks, plan.times() != nullptr);
   std::size_t fewest = 0;
   for (const int index : blocks) {
-    const std::size_t trials = trials_of(protocol.blocks[static_cast<std::size_t>(index)]);
+    const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
+    const std::size_t trials =
+        is_of_reaching(plan) ? movements_of(block, plan.measure()->measure) : trials_of(block);
     fewest = fewest == 0 ? trials : std::min(fewest, trials);
   }
   return fewest;
@@ -159,6 +198,19 @@ void require_trials(const analysis::PlanRecord& plan, const std::string& path,
       " trials of each " +
       (plan.times() != nullptr ? "shape with each renderer" : "participant with each condition") +
       "; this one is for " + others + ": plan again with --trials " + std::to_string(trials));
+}
+
+/// Groups of a plan are two. Movements under one condition differ from nothing but 0.
+void require_contrast(const analysis::PlanRecord& plan, const std::string& path,
+                      const Protocol& protocol) {
+  if (!is_of_reaching(plan) || conditions_of(protocol, plan).differ) return;
+  const bool groups = contrast_of(plan) == PlannedContrast::groups;
+  throw UsageError(printable(path) + ": /model/contrast: expected " +
+                   (groups ? "a protocol of two groups of participants, found " +
+                                 analysis::counted(protocol.groups.names.size(), "group", "groups")
+                           : "a measure of two conditions; the protocol has one that gives it") +
+                   ": plan again with --contrast " +
+                   (groups ? "conditions or zero" : "groups or zero"));
 }
 
 /// A threshold cannot lie beyond its standard.
@@ -200,11 +252,17 @@ std::set<int> at_first_level(const Protocol& protocol, const std::string& factor
 
 }  // namespace
 
-bool PlannedConditions::is_second(const protocols::Trial& trial) const {
+bool PlannedConditions::is_second(const protocols::Trial& trial, std::size_t group) const {
   if (!differ) return false;
+  if (contrast == PlannedContrast::groups) return group == 1;
+  if (contrast == PlannedContrast::zero) return true;
   if (by_renderer) return trial.renderer == protocols::RendererKind::ray;
   if (!factor.empty()) return !first_stimuli.contains(trial.stimulus);
   return trial.task_block != blocks.front() || !first_stimuli.contains(trial.stimulus);
+}
+
+analysis::PlannedContrast contrast_of(const analysis::PlanRecord& plan) {
+  return plan.measure() == nullptr ? PlannedContrast::conditions : plan.measure()->contrast;
 }
 
 PlannedConditions conditions_of(const Protocol& protocol, const analysis::PlanRecord& plan) {
@@ -224,6 +282,12 @@ PlannedConditions conditions_of(const Protocol& protocol, const analysis::PlanRe
     renderers.insert(block.renderers.begin(), block.renderers.end());
     for (const int stimulus : block.stimuli) cells.emplace(index, stimulus);
   }
+  out.contrast = contrast_of(plan);
+  if (out.contrast != PlannedContrast::conditions) {
+    out.factor.clear();
+    out.differ = out.contrast == PlannedContrast::zero || protocol.groups.names.size() == 2;
+    return out;
+  }
   out.by_renderer = renderers.size() > 1;
   if (out.by_renderer) out.factor.clear();
   if (!out.factor.empty()) out.first_stimuli = at_first_level(protocol, out.factor, cells);
@@ -242,6 +306,7 @@ void require_fitting(const analysis::PlanRecord& plan, const std::string& path,
   require_measure(plan, path, protocol);
   if (const analysis::StudyModel* const model = plan.times())
     require_shapes(*model, path, identified(protocol, conditions_of(protocol, plan).blocks));
+  require_contrast(plan, path, protocol);
   require_trials(plan, path, protocol);
   require_possible(plan, path, protocol);
 }

@@ -16,15 +16,20 @@ namespace palpate::runner::registration {
 struct PlannedConditions {
   std::vector<int> blocks;  ///< indices; empty: no block gives the measure
   /// The second condition is the ray; else every level but the first one of a factor; else every
-  /// stimulus and block but the first one.
+  /// stimulus and block but the first one. With another contrast (threshold_plan.h) it is the
+  /// second group, or every trial.
   bool by_renderer = false;
+  analysis::PlannedContrast contrast = analysis::PlannedContrast::conditions;
   std::string factor;           ///< the first one that a block crosses; "": none, or by renderer
-  bool differ = false;          ///< there are two conditions
+  bool differ = false;          ///< there is something to compare
   std::set<int> first_stimuli;  ///< of the first condition, where it is not a renderer's
 
   /// Whether a trial of these blocks is of the second condition.
-  bool is_second(const protocols::Trial& trial) const;
+  /// \param group  index of the participant's
+  bool is_second(const protocols::Trial& trial, std::size_t group) const;
 };
+/// The contrast of a plan of another measure than times.
+analysis::PlannedContrast contrast_of(const analysis::PlanRecord& plan);
 PlannedConditions conditions_of(const protocols::Protocol& protocol,
                                 const analysis::PlanRecord& plan);
 

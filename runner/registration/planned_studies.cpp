@@ -5,7 +5,9 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <mutex>
+#include <optional>
 #include <utility>
 
 #include "analysis/input/study_table.h"
@@ -20,6 +22,7 @@
 #include "data/base/random.h"
 #include "data/export/csv.h"
 #include "data/store/store.h"
+#include "protocols/groups.h"
 #include "protocols/schedule.h"
 #include "protocols/tasks/levels.h"
 #include "runner/build_info.h"
@@ -279,6 +282,17 @@ class PlannedTasks final : public PlannedStudies {
                                              Random& trials) const;
   participants::JudgementSettings of_times(const analysis::StudyModel& model,
                                            const protocols::Trial& trial, Random& person) const;
+  using Visit = std::function<void(int participant, const data::TrialRecord&)>;
+  /// Simulates without storing. Movements keep their paths; the planned measure of their records is
+  /// the plan's.
+  void simulate(std::size_t study, bool with_effect, const Visit& visit) const;
+  void put_movement(const ThresholdStudy& study, std::size_t number, bool with_effect,
+                    int participant, const protocols::Trial& trial, data::ReachRecord& reach) const;
+  void write_movements(data::Store& store, bool with_effect) const;
+  bool of_reaching() const {
+    return made_.plan.measure() != nullptr &&
+           analysis::is_of_reaching(made_.plan.measure()->measure);
+  }
   std::string analyzed(analysis::StudyTable table, int simulations) const;
 
   const Registration& made_;
@@ -292,7 +306,10 @@ PlannedTasks::PlannedTasks(const Registration& made)
       protocol_(made.protocol),
       settings_(participants::load_simulated_settings("")),
       conditions_(conditions_of(made.protocol, made.plan)) {
-  protocol_.samples = false;
+  // Measures of movements come from the samples.
+  protocol_.samples = std::ranges::any_of(protocol_.blocks, [](const protocols::TaskBlock& block) {
+    return block.reaching.has_value();
+  });
   study::fit_to_simulation(protocol_, settings_);
 }
 
@@ -307,7 +324,7 @@ participants::JudgementSettings PlannedTasks::of_measure(const ThresholdStudy& s
   const double place = study.pse_sd * person.normal();
   const double whole =
       study.measure == PlannedMeasure::accuracy ? odds_effect(study) : study.effect;
-  const double half = conditions_.is_second(trial) ? 0.5 : -0.5;
+  const double half = conditions_.is_second(trial, 0) ? 0.5 : -0.5;
   // Shares are planned from the first condition, other measures from the middle of both.
   const double difference = !conditions_.differ ? 0
                             : study.measure == PlannedMeasure::accuracy
@@ -348,6 +365,10 @@ participants::JudgementSettings PlannedTasks::of_measure(const ThresholdStudy& s
       out.number_sd = study.number_sd;
       out.lapse = 0;
       break;
+    case PlannedMeasure::deviation:
+    case PlannedMeasure::aftereffect:
+    case PlannedMeasure::adaptation:
+      break;  // of movements, which are not judged
   }
   out.weber *= std::exp(log_weber);
   out.turn_sd *= std::exp(log_weber);
@@ -366,7 +387,7 @@ participants::JudgementSettings PlannedTasks::of_times(const analysis::StudyMode
   constexpr std::size_t kMostTrials = 2'000;  // of a session
   const std::size_t count = (static_cast<std::size_t>(trial.session) - 1) * kMostTrials +
                             static_cast<std::size_t>(trial.trial);
-  const std::vector<analysis::ModelTrial> same(count, {shape, conditions_.is_second(trial)});
+  const std::vector<analysis::ModelTrial> same(count, {shape, conditions_.is_second(trial, 0)});
   const analysis::ModelAnswer drawn =
       analysis::draw_answers(model, made_.typical_time, same, person).back();
   participants::JudgementSettings out;
@@ -394,17 +415,89 @@ participants::JudgementOf PlannedTasks::judgement(std::size_t study, bool with_e
   };
 }
 
+void PlannedTasks::put_movement(const ThresholdStudy& study, std::size_t number, bool with_effect,
+                                int participant, const protocols::Trial& trial,
+                                data::ReachRecord& reach) const {
+  using protocols::ReachTrial;
+  const bool of_adaptation = study.measure == PlannedMeasure::adaptation;
+  const ReachTrial kind = of_adaptation                                  ? ReachTrial::clamp
+                          : study.measure == PlannedMeasure::aftereffect ? ReachTrial::none
+                                                                         : ReachTrial::field;
+  std::optional<double>& value = of_adaptation ? reach.adaptation : reach.deviation;
+  const bool measured =
+      std::ranges::find(conditions_.blocks, trial.task_block) != conditions_.blocks.end();
+  if (!measured || trial.reach != kind || !value) return;
+  const auto who = static_cast<std::uint64_t>(participant - 1);
+  // The same draws in every trial of a participant.
+  Random person(made_.seed, {with_effect ? 1U : 0U, number, who});
+  const double level = study.participant_sd * person.normal();
+  const double own = study.effect_sd * person.normal();
+  Random movement(made_.seed,
+                  {with_effect ? 1U : 0U, number, who, static_cast<std::uint64_t>(trial.session),
+                   static_cast<std::uint64_t>(trial.trial)});
+  const bool second = conditions_.is_second(trial, made_.protocol.groups.group(participant));
+  const bool typical = of_adaptation && conditions_.contrast != analysis::PlannedContrast::zero;
+  value = (typical ? analysis::kTypicalAdaptation : 0) + level + (second ? study.effect : 0) +
+          study.movement_sd * movement.normal();
+  if (conditions_.contrast == analysis::PlannedContrast::conditions)
+    *value += second ? own / 2 : -own / 2;
+}
+
+void PlannedTasks::simulate(std::size_t study, bool with_effect, const Visit& visit) const {
+  protocols::Trial shown;
+  const participants::JudgementOf judged = judgement(study, with_effect);
+  session::simulate_in_memory(
+      protocol_, settings_, static_cast<int>(made_.participants), made_.seed + study, {},
+      [&](int participant, const data::TrialRecord& record, std::uint64_t) {
+        if (!record.task.reach) return visit(participant, record);
+        data::TrialRecord planned = record;
+        planned.samples.clear();
+        planned.bodies.clear();
+        if (of_reaching())
+          put_movement(study_of(*made_.plan.measure(), with_effect), study, with_effect,
+                       participant, shown, *planned.task.reach);
+        visit(participant, planned);
+      },
+      [&](int participant, const protocols::Trial& trial) {
+        shown = trial;
+        return judged(participant, trial);
+      });
+}
+
+/// As session::simulate_study, without answers to pages.
+void PlannedTasks::write_movements(data::Store& store, bool with_effect) const {
+  std::map<std::pair<int, int>, std::vector<data::TrialRecord>> sessions;  // participant, session
+  simulate(0, with_effect, [&](int participant, const data::TrialRecord& record) {
+    sessions[{participant, record.session}].push_back(record);
+  });
+  const data::ProtocolInfo info = session::info_of(protocol_);
+  for (const auto& [of, records] : sessions) {
+    const auto [number, session] = of;
+    const data::Participant participant =
+        store.enrol(info, session::simulated_code(number), number, true, made_.seed);
+    const data::Run run = store.begin_run(
+        participant, session::simulated_run(protocols::protocol_of(protocol_, number), settings_,
+                                            number, session));
+    store.record_simulated(run, records);
+    store.end_run(run, data::RunEnd::done, records.back().response_ns);
+  }
+}
+
 void PlannedTasks::write(const std::string& folder, const std::string& csv,
                          const std::string& codebook, bool with_effect) const {
   namespace fs = std::filesystem;
   fs::create_directory(folder);
   data::Store store = data::Store::open((fs::path(folder) / "study.db").string(),
                                         data::Store::Mode::write_or_create);
-  session::StudyPlan plan;
-  plan.numbers = session::first_numbers(static_cast<int>(made_.participants));
-  plan.seed = made_.seed;
-  plan.planned = judgement(0, with_effect);
-  session::simulate_study(protocol_, store, settings_, plan, {}, {});
+  if (of_reaching()) {
+    write_movements(store, with_effect);
+  } else {
+    session::StudyPlan plan;
+    plan.numbers = session::first_numbers(static_cast<int>(made_.participants));
+    plan.seed = made_.seed;
+    plan.planned = judgement(0, with_effect);
+    session::simulate_study(protocol_, store, settings_, plan, {}, {});
+  }
   data::ExportSettings settings = study::export_settings();
   settings.codebook = codebook;
   data::export_csv(store, csv, settings);
@@ -432,18 +525,15 @@ std::string PlannedTasks::analyzed(std::size_t study, bool with_effect) const {
   table.simulated = true;
   table.protocols = {{made_.protocol.name, made_.protocol.sha256}};
   // No figure with a name depends on simulated goodness of fit, which takes most of the time.
-  session::simulate_in_memory(
-      protocol_, settings_, static_cast<int>(made_.participants), made_.seed + study, {},
-      [&](int number, const data::TrialRecord& record, std::uint64_t) {
-        if (record.practice) return;
-        analysis::StudyTrial& trial = table.trials.emplace_back(
-            analysis::study_trial_of(session::simulated_code(number), record));
-        trial.protocol_sha256 = made_.protocol.sha256;
-        trial.participant_number = number;
-        trial.group = made_.protocol.groups.name(number);
-        trial.simulated = true;
-      },
-      judgement(study, with_effect));
+  simulate(study, with_effect, [&](int number, const data::TrialRecord& record) {
+    if (record.practice) return;
+    analysis::StudyTrial& trial = table.trials.emplace_back(
+        analysis::study_trial_of(session::simulated_code(number), record));
+    trial.protocol_sha256 = made_.protocol.sha256;
+    trial.participant_number = number;
+    trial.group = made_.protocol.groups.name(number);
+    trial.simulated = true;
+  });
   const protocols::Protocol& own = made_.protocol;
   analysis::put_protocols({{own.name, own.sha256, own.source_text, "", ""}}, "protocol.json",
                           table);

@@ -120,7 +120,7 @@ class TaskAnswers final : public StudyAnswers {
       out +=
           " MEASURE.BLOCK.ratio (or .difference) compares the ray with the point within "
           "participants.";
-    if (!protocol_.factors.empty())
+    if (!protocol_.factors.empty() || protocol_.groups.any())
       out +=
           " effects.MEASURE.BLOCK.EFFECT has f, num_df, den_df, p, p_holm and "
           "generalized_eta_squared of "
@@ -202,7 +202,8 @@ class TaskAnswers final : public StudyAnswers {
     out.push_back(text(
         "'palpate schedule protocol.json --participant N --format order' prints all that is fixed, "
         "a line each: session,renderer,shape,w,x,y,z,block,name,track,level,catch,comparison of a "
-        "trial that is analysed (the orientation with 17 significant digits)" +
+        "trial that is analysed (the orientation with 17 significant digits" +
+        std::string(kinds_.reach ? "; of movements also field, catch or clamp)" : ")") +
         std::string(adaptive.empty()
                         ? ""
                         : "; block,session,number,name with its lines "
@@ -284,10 +285,11 @@ class TaskAnswers final : public StudyAnswers {
     if (kinds_.rate || kinds_.numbers) out.push_back(item("number: as answered."));
     if (kinds_.adjust) out.push_back(item("number: the level that was set."));
     if (kinds_.reach)
-      out.push_back(
-          item("response: in_time, fast or slow, by the block's time window; correct: in time. "
-               "Of the recorded path: deviation, largest_deviation, duration, peak_speed, "
-               "path_ratio, endpoint_error; in clamp trials adaptation."));
+      out.push_back(item(
+          "response: in_time, fast or slow, by the block's time window; correct: in time. "
+          "Of the recorded path: deviation, largest_deviation, duration, peak_speed, "
+          "path_ratio, endpoint_error; in clamp trials adaptation; reach_kind: with the field, "
+          "without it (catch) or along a channel (clamp)."));
     if (kinds_.confidence) out.push_back(item("confidence: the step of its scale."));
     out.push_back(item("timed_out: no answer within the limit."));
     out.push_back(text("codebook.csv explains every column of the data."));
@@ -324,8 +326,9 @@ class TaskAnswers final : public StudyAnswers {
     if (kinds_.reach)
       out.push_back(
           item("Deviation: the mean over a participant's trials with the field, at peak speed, "
-               "sideways from the line to the target. Adaptation: the mean over its clamp trials "
-               "of the slope of the channel's sideways force on that of the field."));
+               "sideways from the line to the target; left is positive. Aftereffect: the same over "
+               "its catch trials. Adaptation: the mean over its clamp trials of the slope of the "
+               "channel's sideways force on that of the field."));
     if (kinds_.identify)
       out.push_back(
           item("Share correct, and the mean of the natural logarithms of the response "
@@ -343,8 +346,8 @@ class TaskAnswers final : public StudyAnswers {
       out.push_back(
           text("Course of learning of each participant: end + (start - end) exp(-trial / trials), "
                "fitted to the deviations over the trials of a block by least squares, where it "
-               "explains at least a tenth of their variance. Means over participants have t "
-               "intervals."));
+               "explains at least a tenth of their variance. Deviations, aftereffects and "
+               "adaptations are not transformed. Means over participants have t intervals."));
     if (kinds_.detect || kinds_.same_different)
       out.push_back(
           text("d' and criterion of the group: H = Phi(d'/2 - c), F = Phi(-d'/2 - c) with "
@@ -452,12 +455,19 @@ class TaskAnswers final : public StudyAnswers {
   std::string rehearsal() const override {
     std::string out =
         " SIMULATED studies with the planned effect and as many with " + contrast() +
-        " were run trial by trial: simulated participants in the loop of 'palpate simulate', whose "
-        "judgements of the true levels have the plan's means and standard deviations. They were "
+        " were run trial by trial: simulated participants in the loop of 'palpate simulate', "
+        "whose " +
+        std::string(plans_movements()
+                        ? "movements have the paths of those of 'palpate simulate' and the plan's "
+                          "means and standard deviations of the planned measure. They were "
+                        : "judgements of the true levels have the plan's means and standard "
+                          "deviations. They were ") +
         "analysed as above. No person took part; the numbers say what the design and the "
         "conditions can show, not what people will do. So few studies tell a share of verdicts "
         "only roughly: its standard error is up to " +
         plain(std::round(50 / std::sqrt(static_cast<double>(studies())))) + " %.";
+    if (conditions_.contrast == analysis::PlannedContrast::groups)
+      out += " The planned effect is between the groups.";
     if (!conditions_.factor.empty())
       out += " The planned effect is between the first level of the factor " + conditions_.factor +
              " and each other one; the other factors have none.";
@@ -468,9 +478,12 @@ class TaskAnswers final : public StudyAnswers {
   }
 
   std::string simulated() const override {
-    return "Simulated participants did the protocol's trials in the loop of `palpate simulate` and "
-           "judged as plan.json says: no person took part. `planned-effect.csv` has the planned "
-           "effect, `no-effect.csv` " +
+    return "Simulated participants did the protocol's trials in the loop of `palpate simulate` "
+           "and " +
+           std::string(plans_movements()
+                           ? "moved as there; the planned measure of each movement is plan.json's"
+                           : "judged as plan.json says") +
+           ": no person took part. `planned-effect.csv` has the planned effect, `no-effect.csv` " +
            contrast() + ". `../codebook.csv` explains the columns.";
   }
 
@@ -497,6 +510,11 @@ class TaskAnswers final : public StudyAnswers {
     return made_.plan.measure()->bound ? "equivalence" : "the effect";
   }
 
+  bool plans_movements() const {
+    return made_.plan.measure() != nullptr &&
+           analysis::is_of_reaching(made_.plan.measure()->measure);
+  }
+
   std::size_t studies() const { return made_.rehearsals.front().with_effect.studies(); }
 
   std::vector<std::string> names_of_blocks() const {
@@ -512,6 +530,7 @@ class TaskAnswers final : public StudyAnswers {
 
   /// "surface:size"
   std::string example_of_effect() const {
+    if (protocol_.factors.empty()) return "group";
     const std::string& first = protocol_.factors.front().name;
     return protocol_.factors.size() < 2 ? first : first + ":" + protocol_.factors[1].name;
   }

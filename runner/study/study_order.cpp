@@ -37,8 +37,13 @@ OrderRow row_of(const Protocol& protocol, const protocols::Trial& trial) {
                {q.w, q.x, q.y, q.z}};
   const TaskBlock& block = protocols::block_of(protocol, trial);
   if (!block.name.empty())
-    row.task = {trial.block, block.name,        trial.track,
-                trial.level, trial.catch_trial, comparison_interval(block, trial)};
+    row.task = {trial.block,
+                block.name,
+                trial.track,
+                trial.level,
+                trial.catch_trial,
+                comparison_interval(block, trial),
+                block.reaching ? protocols::to_string(trial.reach) : ""};
   return row;
 }
 
@@ -116,7 +121,8 @@ std::string to_line(const OrderRow& row) {
   const OrderRow::Task& task = *row.task;
   return line + "," + std::to_string(task.block) + "," + task.name + "," +
          std::to_string(task.track) + "," + (task.level ? digits_of(*task.level) : "") +
-         (task.catch_trial ? ",1," : ",0,") + std::to_string(task.comparison);
+         (task.catch_trial ? ",1," : ",0,") + std::to_string(task.comparison) +
+         (task.reach.empty() ? "" : "," + task.reach);
 }
 
 std::string fixed_order(const Protocol& all, int participant_number) {
