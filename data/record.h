@@ -60,6 +60,13 @@ struct ReachRecord {
   std::optional<double> adaptation;         ///< clamp: slope of that force on the field's
 };
 
+/// A frame in which something of a trial was drawn, on the session clock.
+struct FrameRecord {
+  std::int64_t swap_ns = 0;   ///< after the driver had drawn it
+  std::int64_t pose_ns = 0;   ///< of the tick whose pose is drawn
+  std::int64_t delay_ns = 0;  ///< intended, between both
+};
+
 /// When what was seen of a trial was on the screen, by the clock of the program: a screen and a
 /// compositor add to it. After the intended delay.
 struct SeenRecord {
@@ -67,6 +74,8 @@ struct SeenRecord {
   int dropped = 0;     ///< missing between them, by their median distance
   double lag = 0;      ///< s, median from the tick whose pose is drawn to the swap
   double lag_p99 = 0;  ///< s, likewise
+  std::int64_t first_ns = 0;           ///< session clock, swap of the first; 0: an older version's
+  std::string frames_sha256 = {};      ///< of TrialRecord::frames; "": they are not kept
 
   /// s; half of what people notice between sight and touch (45 ms, Vogels 2004).
   static constexpr double kMostLag = 0.0225;
@@ -76,7 +85,8 @@ struct SeenRecord {
 /// in it (palpate devices --loopback measures that). After the intended delay.
 struct HeardRecord {
   int knocks = 0;
-  double lag = 0;  ///< s, median from the tick of contact
+  double lag = 0;             ///< s, median from the tick of contact
+  std::int64_t first_ns = 0;  ///< session clock, when the first of them was heard
 
   /// s; half of what people notice between sound and touch (24 ms, Adelstein et al. 2003).
   static constexpr double kMostLag = 0.012;
@@ -144,6 +154,7 @@ struct TrialRecord {
   TaskRecord task = {};               ///< stored if it belongs to a block
   /// One for each sample; empty: nothing moves in any of them.
   std::vector<BodyRecord> bodies = {};
+  std::vector<FrameRecord> frames = {};  ///< in which something was drawn; kept with the samples
 };
 
 /// What was presented, in order.

@@ -123,7 +123,7 @@ PUBLIC = {
     "data/base": "cell_name checksum column_names group_assignment input_file json_text markdown random text",
     "data": "column_table record stored_protocol sweep_record",
     "data/files": "atomic_file atomic_folder file_permissions text_sink output_check utc",
-    "data/store": "export_log participant_columns participant_groups protocol_rows schema connection station_database store sweep_file "
+    "data/store": "export_log frames participant_columns participant_groups protocol_rows schema connection station_database store sweep_file "
                   "forget task_text",
     "data/export": "csv datasets sample_slots settings study_about delimited_row",
     "data/merge": "merge",
@@ -145,7 +145,7 @@ PUBLIC = {
     "runner/display": "display explore_window mailbox seen text_display timeline window",
     "runner/display/scene": "camera gl_objects picture drawn_mesh image_file painter scene_drawing "
                             "scene_renderer",
-    "runner/participants": "keyboard reacher respondent simulated_settings simulated "
+    "runner/participants": "keyboard reacher respondent seen_record simulated_settings simulated "
                            "task_participant",
     "runner/session": "device_check effect_check live_forces live_session markers recorded_outcome sample_stream session_scenes signals "
                       "preflight run_record replay session session_end simulated_study "

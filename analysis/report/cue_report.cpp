@@ -133,6 +133,8 @@ Table models_table(const CueAnalysis& analysis) {
         return "any weight, any variance";
       case CueModel::switching:
         return "one cue alone, by trial";
+      case CueModel::causal:
+        return "both as far as they seem one thing";
     }
     return "";
   };

@@ -1,8 +1,10 @@
 #include "analysis/statistics/cues.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
+#include <set>
 #include <utility>
 
 #include "analysis/statistics/describe.h"
@@ -72,7 +74,8 @@ struct Coordinates {
 constexpr std::size_t kOwn = 5;  // coordinates of the single cues and the lapse rate
 
 bool has_weight(CueModel model) {
-  return model == CueModel::free_weight || model == CueModel::free || model == CueModel::switching;
+  return model == CueModel::free_weight || model == CueModel::free ||
+         model == CueModel::switching || model == CueModel::causal;
 }
 
 /// Weight and standard deviation of both cues by a model.
@@ -91,10 +94,72 @@ CueOptimum combined(CueModel model, double haptic_sd, double visual_sd,
     case CueModel::free:
       return {share_of(x[kOwn]), spread * std::exp(x[kOwn + 1])};
     case CueModel::switching:
+    case CueModel::causal:
       return {share_of(x[kOwn]), 0};
   }
   return best;
 }
+
+/// Causal inference about a standard with a conflict and a comparison without. An estimate is the
+/// optimal combination z plus a shift by the distance d of both cues, and z and d are independent.
+class CausalChoice {
+ public:
+  /// \param one_cause  prior probability. \param range  in which two causes may be
+  CausalChoice(double haptic_sd, double visual_sd, double one_cause, double range)
+      : best_(optimum_of(haptic_sd, visual_sd)),
+        apart_(std::hypot(haptic_sd, visual_sd)),
+        one_cause_(one_cause),
+        range_(range) {
+    double sum = 0;
+    for (std::size_t i = 0; i < kNodes; ++i) {
+      const double z = kWidest * (2.0 * static_cast<double>(i) / (kNodes - 1) - 1);
+      places_[i] = z * apart_;
+      weights_[i] = std::exp(-0.5 * z * z);
+      sum += weights_[i];
+    }
+    for (double& weight : weights_) weight /= sum;
+    congruent_ = shifts(0);
+  }
+  /// That the comparison is called the larger.
+  double chosen(const CueBlock& block, double level) {
+    if (&block != block_) {
+      block_ = &block;
+      standard_ = shifts(block.conflict);
+    }
+    const double mu = block.middle + block.conflict * (best_.weight - 0.5);
+    double sum = 0;
+    for (std::size_t i = 0; i < kNodes; ++i) {
+      double inner = 0;
+      for (std::size_t j = 0; j < kNodes; ++j)
+        inner += weights_[j] * normal_cdf((level + congruent_[i] - mu - standard_[j]) /
+                                          (std::numbers::sqrt2 * best_.sd));
+      sum += weights_[i] * inner;
+    }
+    return sum;
+  }
+
+ private:
+  static constexpr std::size_t kNodes = 17;  // trapezoids, exact to 1e-7 of a normal density
+  static constexpr double kWidest = 4;       // sd
+  using Nodes = std::array<double, kNodes>;
+
+  Nodes shifts(double conflict) const {
+    Nodes out{};
+    for (std::size_t i = 0; i < kNodes; ++i) {
+      const double d = conflict + places_[i], z = d / apart_;
+      const double one = one_cause_ * std::exp(-0.5 * z * z) /
+                         (std::sqrt(2 * std::numbers::pi) * apart_);
+      const double two = (1 - one_cause_) / range_;
+      out[i] = -two / (one + two) * best_.weight * d;
+    }
+    return out;
+  }
+
+  CueOptimum best_;
+  double apart_, one_cause_, range_;
+  Nodes places_{}, weights_{}, congruent_{}, standard_{};
+  const CueBlock* block_ = nullptr;  ///< that standard_ is of
+};
 
 double probability_of_both(CueModel model, const CueBlock& block, double level,
                            const CueOptimum& both, double haptic_sd, double visual_sd,
@@ -251,6 +316,28 @@ std::string reason_without_figures(const CueAnswers& answers) {
   return "";
 }
 
+/// Their number: the causal one is told from others by large and small conflicts alone.
+std::size_t models_for(const CueAnswers& answers) {
+  std::set<double> conflicts;
+  for (const CueBlock& block : answers.both) conflicts.insert(block.conflict);
+  return conflicts.size() >= kCausalConflicts ? kCueModels : kCueModels - 1;
+}
+
+/// Of the models that every participant has.
+std::vector<CueModelSum> sums_of(const std::vector<CueParticipant>& participants) {
+  std::size_t count = participants.empty() ? 0 : kCueModels;
+  for (const CueParticipant& one : participants) count = std::min(count, one.models.size());
+  std::vector<CueModelSum> out;
+  for (std::size_t m = 0; m < count; ++m) {
+    CueModelSum& sum = out.emplace_back(CueModelSum{static_cast<CueModel>(m), 0, 0});
+    for (const CueParticipant& one : participants) {
+      sum.aic += one.models[m].aic();
+      sum.best_for += one.best == sum.model ? 1 : 0;
+    }
+  }
+  return out;
+}
+
 CueTest test_of(const std::vector<double>& differences) {
   CueTest out;
   if (differences.empty()) {
@@ -266,7 +353,7 @@ CueTest test_of(const std::vector<double>& differences) {
 
 const char* to_string(CueModel model) {
   constexpr std::array kNames = {"optimal",     "best-cue", "equal-weights",
-                                 "free-weight", "free",     "switching"};
+                                 "free-weight", "free",     "switching", "causal"};
   return kNames[static_cast<std::size_t>(model)];
 }
 
@@ -283,10 +370,13 @@ CueModelFit fit_cues(const CueAnswers& answers, CueModel model) {
     sum -= log_likelihood(answers.haptic, at.haptic_mu(x), felt, lapse);
     sum -= log_likelihood(answers.visual, at.visual_mu(x), seen, lapse);
     const CueOptimum both = combined(model, felt, seen, x, at.haptic.spread);
+    CausalChoice causal(felt, seen, model == CueModel::causal ? both.weight : 1, at.haptic.spread);
     for (const CueBlock& block : answers.both) {
       for (const LevelCount& count : block.counts)
         sum -= log_binomial(
-            count, probability_of_both(model, block, count.level, both, felt, seen, lapse));
+            count, model == CueModel::causal
+                       ? shared_of(lapse, causal.chosen(block, count.level))
+                       : probability_of_both(model, block, count.level, both, felt, seen, lapse));
     }
     return sum;
   };
@@ -307,6 +397,12 @@ CueModelFit fit_cues(const CueAnswers& answers, CueModel model) {
     steps.push_back(0.2);
   }
   SimplexMinimum best = minimize(loss, start, steps, 1e-9);
+  // One cause or two may explain small conflicts.
+  if (model == CueModel::causal) {
+    start[kOwn] = 2;
+    const SimplexMinimum other = minimize(loss, start, steps, 1e-9);
+    if (other.value < best.value) best = other;
+  }
   // The better cue may be either: the likelihood has a maximum on both sides.
   if (model == CueModel::best_cue) {
     std::swap(start[1], start[3]);
@@ -353,9 +449,9 @@ CueParticipant analyze_cues(const CueAnswers& answers, const CueSettings& settin
   out.jnd_predicted = jnd * predicted.sd;
   out.jnd_better = jnd * better_sd(answers, haptic, visual, lapse, settings, stream);
   if (!settings.models) return out;
-  for (std::size_t m = 0; m < kCueModels; ++m) {
+  for (std::size_t m = 0; m < models_for(answers); ++m) {
     const auto model = static_cast<CueModel>(m);
-    out.models[m] = model == CueModel::free ? free : fit_cues(answers, model);
+    out.models.push_back(model == CueModel::free ? free : fit_cues(answers, model));
     if (out.models[m].aic() < out.models[static_cast<std::size_t>(out.best)].aic())
       out.best = model;
   }
@@ -366,8 +462,6 @@ CueAnalysis analyze_all_cues(const std::vector<CueAnswers>& answers, const CueSe
   CueAnalysis out;
   out.settings = settings;
   std::vector<double> weight, predicted, better;
-  for (std::size_t m = 0; settings.models && m < kCueModels; ++m)
-    out.models.push_back({static_cast<CueModel>(m), 0, 0});
   for (std::size_t i = 0; i < answers.size(); ++i) {
     CueParticipant one = analyze_cues(answers[i], settings, i);
     if (!one.undefined.empty()) {
@@ -377,12 +471,9 @@ CueAnalysis analyze_all_cues(const std::vector<CueAnswers>& answers, const CueSe
     weight.push_back(one.weight_visual - one.weight_predicted);
     predicted.push_back(std::log(one.jnd_both / one.jnd_predicted));
     better.push_back(std::log(one.jnd_both / one.jnd_better));
-    for (CueModelSum& sum : out.models) {
-      sum.aic += one.models[static_cast<std::size_t>(sum.model)].aic();
-      sum.best_for += one.best == sum.model ? 1 : 0;
-    }
     out.participants.push_back(std::move(one));
   }
+  out.models = sums_of(out.participants);
   out.weight = test_of(weight);
   out.jnd_predicted = test_of(predicted);
   out.jnd_better = test_of(better);

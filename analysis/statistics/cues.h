@@ -7,7 +7,6 @@
 // s: standard deviation of a single estimate, in the unit of the level. A standard is seen at
 // S + D/2 and felt at S - D/2, the comparison is congruent.
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -40,9 +39,13 @@ enum class CueModel {
   free_weight,    ///< any weight, the variance of the optimal combination
   free,           ///< any weight and variance
   switching,      ///< from trial to trial one of the cues alone
+  /// Combined as far as both seem to have one cause, else what is felt (Koerding et al. 2007; model
+  /// averaging); two causes may be anywhere in the range of the levels. Needs kCausalConflicts.
+  causal,
 };
-inline constexpr std::size_t kCueModels = 6;
-/// "optimal", "best-cue", "equal-weights", "free-weight", "free", "switching"
+inline constexpr std::size_t kCueModels = 7;
+inline constexpr std::size_t kCausalConflicts = 5;  ///< different ones, for the last model
+/// "optimal", "best-cue", "equal-weights", "free-weight", "free", "switching", "causal"
 const char* to_string(CueModel model);
 
 /// A fit of all answers of a participant: lapse rate, both single cues with points of equality of
@@ -51,8 +54,8 @@ struct CueModelFit {
   double log_likelihood = 0;
   int parameters = 0;
   double haptic_sd = 0, visual_sd = 0, lapse = 0;
-  double weight = 0;   ///< of the seen; switching: its probability
-  double both_sd = 0;  ///< of a single combined estimate; switching: none, 0
+  double weight = 0;   ///< of the seen; switching: its probability; causal: that of one cause
+  double both_sd = 0;  ///< of a single combined estimate; switching, causal: none, 0
   double aic() const { return 2 * parameters - 2 * log_likelihood; }
 };
 CueModelFit fit_cues(const CueAnswers& answers, CueModel model);
@@ -76,7 +79,7 @@ struct CueParticipant {
   /// chance.
   double jnd_better = 0;
   std::vector<CuePse> points;
-  std::array<CueModelFit, kCueModels> models;
+  std::vector<CueModelFit> models;  ///< in the order of CueModel; without the last where it needs more
   CueModel best = CueModel::optimal;  ///< of the least AIC
 };
 

@@ -40,7 +40,7 @@ class MotionEvents {
   /// \param slot  of the trial's onset, in servo periods from the start of the run
   void add(const StoredTrial& trial, std::int64_t slot);
   /// ..._events.tsv. \param first_row  slot of the recording's first row
-  std::string table(std::int64_t first_row, double rate) const;
+  std::string table(std::int64_t first_row, const ProtocolFacts& facts) const;
   static nlohmann::ordered_json description(const ProtocolFacts& facts);
 
  private:
@@ -53,6 +53,7 @@ class MotionEvents {
     std::optional<double> level;
     std::optional<bool> correct;
     std::array<double, 4> orientation_wxyz{};
+    std::optional<double> seen_on, sound;  ///< s, from the onset
   };
   std::vector<Event> events_;
 };
@@ -91,8 +92,8 @@ std::string unit_or_none(const Column& column) {
   return unit.empty() || unit == "1" ? "n/a" : std::string(unit);
 }
 
-const std::vector<Column>& event_columns() {
-  static const std::vector<Column> all = {
+std::vector<Column> event_columns(const ProtocolFacts& facts) {
+  std::vector<Column> all = {
       {"onset", "From the first row of the motion file of the same run", "s"},
       {"duration", "To the response of a trial; in a time-out, the time limit", "s"},
       {"trial_type",
@@ -115,6 +116,16 @@ const std::vector<Column>& event_columns() {
       {"orientation_y", "Orientation of the stimulus, unit quaternion, y", "1"},
       {"orientation_z", "Orientation of the stimulus, unit quaternion, z", "1"},
   };
+  if (facts.seen)
+    all.push_back({"seen_on",
+                   "From the onset of the trial to the first frame in which something was drawn, by "
+                   "the program's clock; missing: nothing was",
+                   "s"});
+  if (facts.heard)
+    all.push_back({"sound",
+                   "From the onset of the trial to the first contact that was heard, without what "
+                   "the sound card adds; missing: none was",
+                   "s"});
   return all;
 }
 
@@ -188,12 +199,17 @@ void MotionEvents::add(const StoredTrial& trial, std::int64_t slot) {
   event.response = record.response;
   event.correct = correct_of(record);
   event.orientation_wxyz = record.orientation_wxyz;
-  events_.push_back(event);
-  if (record.task.intervals.empty()) return;
   const std::int64_t begin = first_onset_ns(record);
   const auto seconds = [](std::int64_t from_ns, std::int64_t to_ns) {
     return (static_cast<double>(to_ns) - static_cast<double>(from_ns)) / 1e9;
   };
+  if (const auto& seen = record.task.seen; seen && seen->first_ns != 0)
+    event.seen_on = seconds(begin, seen->first_ns);
+  if (const auto& heard = record.task.heard) event.sound = seconds(begin, heard->first_ns);
+  events_.push_back(event);
+  if (record.task.intervals.empty()) return;
+  event.seen_on.reset();
+  event.sound.reset();
   event.response.clear();
   event.correct.reset();
   for (const IntervalRecord& interval : record.task.intervals) {
@@ -208,12 +224,12 @@ void MotionEvents::add(const StoredTrial& trial, std::int64_t slot) {
   }
 }
 
-std::string MotionEvents::table(std::int64_t first_row, double rate) const {
+std::string MotionEvents::table(std::int64_t first_row, const ProtocolFacts& facts) const {
   DelimitedRow row(DelimitedFormat::tsv);
-  row << std::span<const Column>(event_columns());
+  row << std::span<const Column>(event_columns(facts));
   std::string table = row.end();
   for (const Event& event : events_) {
-    row << static_cast<double>(event.slot - first_row) / rate + event.since << event.duration
+    row << static_cast<double>(event.slot - first_row) / facts.servo_rate + event.since << event.duration
         << (event.interval > 0 ? "interval" : "trial") << event.trial;
     if (event.interval > 0)
       row << event.interval;
@@ -221,6 +237,8 @@ std::string MotionEvents::table(std::int64_t first_row, double rate) const {
       row << "";
     row << event.renderer << event.shape << event.level << event.response << event.correct;
     for (const double q : event.orientation_wxyz) row << q;
+    if (facts.seen) row << event.seen_on;
+    if (facts.heard) row << event.sound;
     table += row.end();
   }
   return table;
@@ -228,7 +246,7 @@ std::string MotionEvents::table(std::int64_t first_row, double rate) const {
 
 nlohmann::ordered_json MotionEvents::description(const ProtocolFacts& facts) {
   nlohmann::ordered_json json;
-  for (const Column& column : event_columns())
+  for (const Column& column : event_columns(facts))
     json[column.name] = describe_column(column, facts, {});
   return json;
 }
@@ -470,7 +488,7 @@ void BidsRecording::put_trials(nlohmann::ordered_json& sidecar) const {
 }
 
 std::string BidsRecording::motion_events() const {
-  return events_.table(first_row_, study_.facts.servo_rate);
+  return events_.table(first_row_, study_.facts);
 }
 
 std::int64_t BidsRecording::first_row_ns() const {

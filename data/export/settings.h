@@ -30,6 +30,8 @@ struct BlockFacts {
 struct ProtocolFacts {
   std::string title = {};    ///< "" for none
   double servo_rate = 1000;  ///< Hz
+  bool seen = false;         ///< something of a stimulus may be seen
+  bool heard = false;        ///< contacts of a stimulus may be heard
   std::vector<StimulusFacts> stimuli = {};
   std::vector<BlockFacts> blocks = {};                              ///< empty: version 1
   std::vector<std::pair<std::string, std::string>> questions = {};  ///< "PAGE, ITEM" -> its text

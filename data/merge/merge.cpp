@@ -29,6 +29,7 @@
 #include "data/files/file_permissions.h"
 #include "data/files/output_check.h"
 #include "data/store/connection.h"
+#include "data/store/frames.h"
 #include "data/store/protocol_rows.h"
 #include "data/store/schema.h"
 
@@ -496,6 +497,7 @@ class SessionCopier {
     copy_notes();
     copy_attempts();
     copy_samples();
+    copy_frames();
     copy_page_answers();
   }
 
@@ -554,6 +556,13 @@ class SessionCopier {
     Inserter add = inserter("samples", 1, "attempt_id", rows_[3].columns);
     each_row(rows_[3].select, [&](auto& row) {
       add({attempts_.at({row.getColumn(0).getInt64(), row.getColumn(1).getInt64()})}, row);
+    });
+  }
+  void copy_frames() {
+    if (!has_frames(from_, from_.getFilename())) return;
+    each_row("SELECT trial, attempt, id FROM attempts WHERE session_id = ?1", [&](auto& row) {
+      write_frames(to_, attempts_.at({row.getColumn(0).getInt64(), row.getColumn(1).getInt64()}),
+                   read_frames(from_, row.getColumn(2).getInt64()));
     });
   }
 

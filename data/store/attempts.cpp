@@ -19,6 +19,7 @@
 #include "data/errors.h"
 #include "data/files/utc.h"
 #include "data/store/connection.h"
+#include "data/store/frames.h"
 #include "data/store/protocol_rows.h"
 #include "data/store/record_columns.h"
 #include "data/store/seals.h"
@@ -322,6 +323,7 @@ class AttemptReader {
   void require_files(const RunInfo& run, std::int64_t protocol);
   void read_attempt(std::optional<ChainCheck>& chain);
   void read_samples(std::int64_t attempt, const std::optional<Checksum>& sum);
+  void read_frames(std::int64_t attempt);
   void require_no_hidden_rows();
 
   SQLite::Database& db_;
@@ -463,6 +465,15 @@ void AttemptReader::read_samples(std::int64_t attempt, const std::optional<Check
   }
 }
 
+void AttemptReader::read_frames(std::int64_t attempt) {
+  const auto& seen = trial_.record.task.seen;
+  if (!seen || seen->frames_sha256.empty()) return;
+  std::vector<FrameRecord> frames = data::read_frames(db_, attempt);
+  if (frames_checksum(frames) != seen->frames_sha256)
+    throw SQLite::Exception("its frames were changed since they were recorded", SQLITE_CORRUPT);
+  if (filter_.samples == SampleReading::unpack) trial_.record.frames = std::move(frames);
+}
+
 void AttemptReader::read_attempt(std::optional<ChainCheck>& chain) {
   TrialRecord& record = trial_.record;
   record = {};
@@ -508,6 +519,7 @@ void AttemptReader::read_attempt(std::optional<ChainCheck>& chain) {
   if (filter_.samples != SampleReading::skip &&
       (filter_.samples_wanted == nullptr || (*filter_.samples_wanted)(trial_))) {
     read_samples(id, about.samples);
+    read_frames(id);
   }
   record.onset_utc = format_utc(to_unix_ns(trial_.run.clock, record.onset_ns));
   visit_(trial_);
@@ -623,6 +635,13 @@ std::string completing_sql() {
   return sql + "samples_sha256 = ?, task = ? WHERE id = ?";
 }
 
+/// The task with the checksum of its frames.
+TaskRecord task_with_frames(const TrialRecord& record) {
+  TaskRecord task = record.task;
+  if (task.seen && !record.frames.empty()) task.seen->frames_sha256 = frames_checksum(record.frames);
+  return task;
+}
+
 void complete(SQLite::Database& db, SQLite::Statement& update, std::int64_t id,
               const TrialRecord& record) {
   update.reset();
@@ -638,8 +657,9 @@ void complete(SQLite::Database& db, SQLite::Statement& update, std::int64_t id,
   bind << (count > 0 ? std::optional(checksum_of_samples(packed.packing, count, packed.bytes.data(),
                                                          packed.bytes.size()))
                      : std::nullopt)
-       << task_text(record.task) << id;
+       << task_text(task_with_frames(record)) << id;
   update.exec();
+  write_frames(db, id, record.frames);
   if (count == 0) return;
   SQLite::Statement insert(
       db, "INSERT INTO samples (attempt_id, packing, count, data) VALUES (?, ?, ?, ?)");

@@ -24,6 +24,7 @@
 #include "data/files/atomic_file.h"
 #include "data/files/file_permissions.h"
 #include "data/store/connection.h"
+#include "data/store/frames.h"
 #include "data/store/open.h"
 #include "data/store/record_columns.h"
 
@@ -232,6 +233,11 @@ std::string session_ids() {
 
 void delete_rows(SQLite::Database& db, const std::string& code) {
   const std::string sessions = session_ids();
+  if (has_frames(db, db.getFilename())) {
+    SQLite::Statement remove(db, "DELETE FROM frames WHERE attempt_id IN " + attempt_ids());
+    Binder(remove) << code;
+    remove.exec();
+  }
   for (const std::string& what :
        {"samples WHERE attempt_id IN " + attempt_ids(), "attempts WHERE session_id IN " + sessions,
         "notes WHERE run_id IN (SELECT id FROM runs WHERE session_id IN " + sessions + ")",

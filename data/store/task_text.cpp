@@ -83,8 +83,13 @@ std::optional<std::string> task_text(const TaskRecord& task) {
                    {"dropped", task.seen->dropped},
                    {"lag_s", task.seen->lag},
                    {"lag_p99_s", task.seen->lag_p99}};
+    if (task.seen->first_ns != 0) out["seen"]["first_ns"] = task.seen->first_ns;
+    if (!task.seen->frames_sha256.empty()) out["seen"]["frames_sha256"] = task.seen->frames_sha256;
   }
-  if (task.heard) out["heard"] = {{"knocks", task.heard->knocks}, {"lag_s", task.heard->lag}};
+  if (task.heard)
+    out["heard"] = {{"knocks", task.heard->knocks},
+                    {"lag_s", task.heard->lag},
+                    {"first_ns", task.heard->first_ns}};
   return out.dump();
 }
 
@@ -108,11 +113,13 @@ TaskRecord parse_task_text(const std::string& text) {
     if (in.contains("seen")) {
       const Json& seen = in.at("seen");
       task.seen = {seen.at("frames").get<int>(), seen.at("dropped").get<int>(),
-                   seen.at("lag_s").get<double>(), seen.at("lag_p99_s").get<double>()};
+                   seen.at("lag_s").get<double>(), seen.at("lag_p99_s").get<double>(),
+                   seen.value("first_ns", std::int64_t{0}), seen.value("frames_sha256", "")};
     }
     if (in.contains("heard")) {
       const Json& heard = in.at("heard");
-      task.heard = {heard.at("knocks").get<int>(), heard.at("lag_s").get<double>()};
+      task.heard = {heard.at("knocks").get<int>(), heard.at("lag_s").get<double>(),
+                    heard.at("first_ns").get<std::int64_t>()};
     }
     if (!in.contains("reach")) return task;
     const Json& reach = in.at("reach");

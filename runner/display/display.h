@@ -122,6 +122,7 @@ struct SeenTrial;
 struct SeenFrame {
   std::int64_t swap_ns = 0;  ///< after the driver had drawn it
   std::int64_t pose_ns = 0;  ///< of the tick whose pose is drawn
+  std::int64_t delay_ns = 0;  ///< intended, between both
 };
 
 struct KeyPress {

@@ -417,7 +417,7 @@ void ParticipantWindow::paint_seen(int width, int height, bool changed) {
   glfwSwapBuffers(window_);
   glFinish();
   needs_redraw_ = false;
-  if (frame.moment != nullptr) frames_.add({settings_.clock->now_ns(), moment->time_ns});
+  if (frame.moment != nullptr) frames_.add({settings_.clock->now_ns(), moment->time_ns, delay});
 }
 
 void ParticipantWindow::paint(int width, int height) {

@@ -24,7 +24,6 @@
 #include "protocols/answer_keys.h"
 #include "protocols/tasks/levels.h"
 #include "runner/display/seen.h"
-#include "runner/participants/seen_record.h"
 #include "runner/scene_builder.h"
 
 namespace palpate::runner::participants {
@@ -461,12 +460,14 @@ void KeyboardRespondent::see(const protocols::Trial& trial, const protocols::Int
   if (interval != nullptr) seen = seen_trial_of(protocol_, trial, *interval);
   if (seen == nullptr && !sees_) return;
   sees_ = seen != nullptr;
-  if (sees_) delay_ = seen->seen.delay;
   screen_.see(seen);
 }
 
-std::optional<data::SeenRecord> KeyboardRespondent::seen() {
-  return seen_record(screen_.frames(), std::exchange(delay_, 0));
+std::vector<data::FrameRecord> KeyboardRespondent::frames() {
+  std::vector<data::FrameRecord> out;
+  for (const display::SeenFrame& frame : screen_.frames())
+    out.push_back({frame.swap_ns, frame.pose_ns, frame.delay_ns});
+  return out;
 }
 
 void KeyboardRespondent::begin_interval(const protocols::Trial& trial, const IntervalView& view) {

@@ -54,7 +54,7 @@ class KeyboardRespondent final : public Respondent {
   void begin_trial(const protocols::Trial& trial) override;
   void begin_interval(const protocols::Trial& trial, const IntervalView& view) override;
   std::optional<Answer> step(const servo::Sample& sample) override;
-  std::optional<data::SeenRecord> seen() override;
+  std::vector<data::FrameRecord> frames() override;
   std::optional<Answer> confidence(const protocols::ConfidenceSpec& asked) override;
   std::optional<std::string> ask(const protocols::PageSpec& page, const protocols::PageItem& item,
                                  const Asking& how) override;
@@ -130,7 +130,6 @@ class KeyboardRespondent final : public Respondent {
   const protocols::TaskBlock* block_ = nullptr;  ///< of the trial; may be null
   IntervalView view_;
   bool sees_ = false;              ///< something of the interval is seen
-  double delay_ = 0;               ///< s, intended, of what was seen last
   std::int64_t way_shown_ns_ = 0;  ///< of a movement's picture
   bool early_ = false;             ///< a trial or interval is prepared but cannot be answered yet
   std::optional<double> least_, most_;     ///< range of the number being typed

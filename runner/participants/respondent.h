@@ -89,8 +89,8 @@ class Respondent {
                                          const Asking& /*how*/) {
     return "";
   }
-  /// What was drawn of the trial that ends; none: nothing was seen.
-  virtual std::optional<data::SeenRecord> seen() { return std::nullopt; }
+  /// What was drawn of the trial that ends; empty: nothing was seen.
+  virtual std::vector<data::FrameRecord> frames() { return {}; }
   /// A trial is on record: of this run, or of an earlier one that the session resumes.
   virtual void learn_from(const data::TrialRecord& /*record*/) {}
   /// Called with every sample of the servo. Returns the answer once there is one; answers before

@@ -6,15 +6,14 @@
 
 namespace palpate::runner::participants {
 
-std::optional<data::SeenRecord> seen_record(const std::vector<display::SeenFrame>& frames,
-                                            double delay) {
+std::optional<data::SeenRecord> seen_record(const std::vector<data::FrameRecord>& frames) {
   if (frames.empty()) return std::nullopt;
   constexpr double kNanosecond = 1e-9;  // s
   constexpr double kPause = 0.25;       // s; longer: between intervals
   std::vector<double> lags, steps;
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    lags.push_back(kNanosecond * static_cast<double>(frames[i].swap_ns - frames[i].pose_ns) -
-                   delay);
+    lags.push_back(kNanosecond * static_cast<double>(frames[i].swap_ns - frames[i].pose_ns -
+                                                     frames[i].delay_ns));
     const double step =
         i == 0 ? kPause
                : kNanosecond * static_cast<double>(frames[i].swap_ns - frames[i - 1].swap_ns);
@@ -28,6 +27,7 @@ std::optional<data::SeenRecord> seen_record(const std::vector<display::SeenFrame
   };
   data::SeenRecord out;
   out.frames = static_cast<int>(frames.size());
+  out.first_ns = frames.front().swap_ns;
   out.lag = quantile(lags, 0.5);
   out.lag_p99 = quantile(lags, 0.99);
   if (steps.empty()) return out;

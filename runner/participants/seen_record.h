@@ -5,12 +5,10 @@
 #include <vector>
 
 #include "data/record.h"
-#include "runner/display/display.h"
 
 namespace palpate::runner::participants {
 
-/// None: there were no frames. \param delay  s, intended
-std::optional<data::SeenRecord> seen_record(const std::vector<display::SeenFrame>& frames,
-                                            double delay);
+/// None: there were no frames.
+std::optional<data::SeenRecord> seen_record(const std::vector<data::FrameRecord>& frames);
 
 }  // namespace palpate::runner::participants

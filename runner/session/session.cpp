@@ -15,6 +15,7 @@
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
 #include "rendering/fields.h"
+#include "runner/participants/seen_record.h"
 #include "runner/session/reach_measures.h"
 #include "runner/session/recorded_outcome.h"
 #include "runner/session/run_record.h"
@@ -93,12 +94,13 @@ std::vector<std::size_t> open_questions(const PageSpec& page,
   return open;
 }
 
-/// \param lags  s, of each knock; \return none: there was none
-std::optional<data::HeardRecord> heard_record(std::vector<double> lags) {
-  if (lags.empty()) return std::nullopt;
-  const auto middle = lags.begin() + static_cast<std::ptrdiff_t>(lags.size() / 2);
-  std::ranges::nth_element(lags, middle);
-  return data::HeardRecord{static_cast<int>(lags.size()), *middle};
+/// None: there were no knocks.
+std::optional<data::HeardRecord> heard_record(std::vector<sound::Knock> knocks) {
+  if (knocks.empty()) return std::nullopt;
+  const std::int64_t first_ns = knocks.front().heard_ns;
+  const auto middle = knocks.begin() + static_cast<std::ptrdiff_t>(knocks.size() / 2);
+  std::ranges::nth_element(knocks, middle, {}, &sound::Knock::lag);
+  return data::HeardRecord{static_cast<int>(knocks.size()), middle->lag, first_ns};
 }
 
 std::array<double, 3> values(const Vec3& v) { return {v.x, v.y, v.z}; }
@@ -630,8 +632,10 @@ bool Session::run_trial() {
   record_.max_force = quality_.max_force;
   record_.contact_share = contact_.contact_share();
   record_.edge_dwell = contact_.edge_dwell(1 / station_.protocol.servo_rate);
-  record_.task.seen = participant_.seen();
-  if (station_.sound != nullptr) record_.task.heard = heard_record(station_.sound->take_lags());
+  record_.frames = participant_.frames();
+  record_.task.seen = participants::seen_record(record_.frames);
+  if (!station_.protocol.samples) record_.frames.clear();
+  if (station_.sound != nullptr) record_.task.heard = heard_record(station_.sound->take_knocks());
   if (events_ != nullptr) events_->answered(record_);
   return true;
 }

@@ -89,7 +89,8 @@ void ContactSound::scrape(const servo::HeardTick& tick, const Vec3& sliding) {
 
 void ContactSound::begin(Voice& voice, std::int64_t at_ns) {
   voice.begun = true;
-  newest_lag_ = static_cast<double>(at_ns - voice.tick_ns) / kPerSecond_ns - voice.source->delay;
+  newest_ = {at_ns,
+             static_cast<double>(at_ns - voice.tick_ns) / kPerSecond_ns - voice.source->delay};
 }
 
 void ContactSound::add_voice(Voice& voice, std::span<double> left, std::span<double> right,
@@ -164,6 +165,6 @@ void ContactSound::add(std::span<double> left, std::span<double> right, std::int
   }
 }
 
-std::optional<double> ContactSound::take_lag() { return std::exchange(newest_lag_, std::nullopt); }
+std::optional<Knock> ContactSound::take_knock() { return std::exchange(newest_, std::nullopt); }
 
 }  // namespace palpate::runner::sound

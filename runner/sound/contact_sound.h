@@ -15,6 +15,12 @@
 
 namespace palpate::runner::sound {
 
+/// When a knock was heard.
+struct Knock {
+  std::int64_t heard_ns = 0;  ///< session clock, without what the sound card adds
+  double lag = 0;             ///< s, from the tick of its contact, beyond the intended delay
+};
+
 /// Every sound is heard the same time after its tick, whenever the thread that asks for samples
 /// wakes up. A knock begins when the stylus touches after 20 ms without contact, as loud as the
 /// speed of entry (at most 1 m/s). Belongs to the sound's thread.
@@ -32,9 +38,8 @@ class ContactSound {
   /// Adds the next samples to both ears; full scale is 1.
   /// \param heard_ns  session clock, when the first of them is heard
   void add(std::span<double> left, std::span<double> right, std::int64_t heard_ns);
-  /// s, from the tick to the sound beyond the intended delay, of the newest knock since the last
-  /// call that has begun; none: none has.
-  std::optional<double> take_lag();
+  /// The newest knock that has begun since the last call.
+  std::optional<Knock> take_knock();
   bool silent() const { return voices_.empty() && changes_.empty() && level_ < kInaudible; }
 
  private:
@@ -74,7 +79,7 @@ class ContactSound {
   double target_ = 0, level_ = 0;  ///< of scraping, full scale 1
   std::shared_ptr<const SoundSource> scraped_;
   std::vector<std::complex<double>> resonators_;
-  std::optional<double> newest_lag_;
+  std::optional<Knock> newest_;
   std::vector<double> mixed_left_, mixed_right_;
 };
 

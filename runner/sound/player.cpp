@@ -8,7 +8,6 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
-#include "runner/sound/contact_sound.h"
 #include "runner/sound/noise_signal.h"
 
 namespace palpate::runner::sound {
@@ -98,9 +97,9 @@ void SoundPlayer::contacts(const protocols::SoundSpec* sound) {
   next_source_ = std::move(source);
 }
 
-std::vector<double> SoundPlayer::take_lags() {
+std::vector<Knock> SoundPlayer::take_knocks() {
   const std::lock_guard lock(contacts_);
-  return std::exchange(lags_, {});
+  return std::exchange(knocks_, {});
 }
 
 SoundReport SoundPlayer::report() const {
@@ -148,9 +147,9 @@ void SoundPlayer::play_blocks() {
       servo::HeardTick tick;
       while (settings_.ticks->pop(tick)) touched.hear(tick);
       touched.add(left, right, now_ns() + std::llround(1e9 * output_->latency()));
-      if (const std::optional<double> lag = touched.take_lag()) {
+      if (const std::optional<Knock> knock = touched.take_knock()) {
         const std::lock_guard lock(contacts_);
-        lags_.push_back(*lag);
+        knocks_.push_back(*knock);
       }
     }
     for (std::size_t i = 0; i < block; ++i) {

@@ -14,6 +14,7 @@
 
 #include "protocols/protocol.h"
 #include "runner/servo/heard_tick.h"
+#include "runner/sound/contact_sound.h"
 #include "runner/sound/sound_output.h"
 #include "runner/sound/sound_source.h"
 #include "runner/sound/tone_signal.h"
@@ -69,9 +70,8 @@ class SoundPlayer {
   /// From now on contacts sound like this; null: like nothing. \throws SoundError: a recording
   /// cannot be read
   void contacts(const protocols::SoundSpec* sound);
-  /// s, of each knock heard since the last call: from its tick to the sound, beyond the intended
-  /// delay and without what the card adds
-  std::vector<double> take_lags();
+  /// The knocks since the last call, in order.
+  std::vector<Knock> take_knocks();
 
   bool on() const { return on_.load(); }
   /// The output has failed since turn_on().
@@ -105,7 +105,7 @@ class SoundPlayer {
 
   std::mutex contacts_;                                            ///< of the next two
   std::optional<std::shared_ptr<const SoundSource>> next_source_;  ///< none: no change
-  std::vector<double> lags_;
+  std::vector<Knock> knocks_;
 
   std::jthread thread_;
 };

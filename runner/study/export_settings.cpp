@@ -79,10 +79,12 @@ data::ProtocolFacts facts_of(const data::ProtocolInfo& info) {
   if (!(facts.servo_rate > 0))
     throw data::StoreRefused("protocol " + info.name + " has no servo rate");
   facts.questions = questions_of(json);
+  facts.seen = json.contains("view");
   if (!json.contains("stimuli") || !json["stimuli"].is_array()) return facts;
   for (const auto& stimulus : json["stimuli"]) {
     if (!stimulus.is_object() || !stimulus.contains("name") || !stimulus["name"].is_string())
       continue;
+    facts.heard |= stimulus.contains("sound");
     nlohmann::ordered_json object = stimulus;
     object.erase("name");
     facts.stimuli.push_back({stimulus["name"], object.dump()});

@@ -45,6 +45,8 @@ struct Person {
       case CueModel::switching:
         return weight * single(1 + conflict / 2, kVisual) +
                (1 - weight) * single(1 - conflict / 2, kHaptic);
+      case CueModel::causal:
+        break;  // causal_answers()
     }
     return 0.5;
   }
@@ -134,6 +136,87 @@ TEST(Cues, EachRuleIsFoundInMostPeople) {
     std::printf("%s: %d of %d\n", to_string(person.rule), found, kPeople);
     EXPECT_GE(found, within_others ? 24 : 34) << to_string(person.rule);
   }
+}
+
+double normal(Random& random) {
+  const double u = 1 - random.unit(), v = random.unit();
+  return std::sqrt(-2 * std::log(u)) * std::cos(2 * std::numbers::pi * v);
+}
+
+/// What a person with a prior probability of one cause estimates of a thing that is felt and seen.
+double causal_estimate(double felt_size, double seen_size, double one_cause, double range,
+                       Random& random) {
+  const double felt = felt_size + kHaptic * normal(random),
+               seen = seen_size + kVisual * normal(random);
+  const double variance = kHaptic * kHaptic + kVisual * kVisual, d = seen - felt;
+  const double one = one_cause * std::exp(-d * d / (2 * variance)) /
+                     std::sqrt(2 * std::numbers::pi * variance);
+  const double two = (1 - one_cause) / range;
+  const double weight = kHaptic * kHaptic / variance;
+  const double both = weight * seen + (1 - weight) * felt;
+  return (one * both + two * felt) / (one + two);
+}
+
+/// Answers of that person, drawn trial by trial from estimates of both intervals.
+CueAnswers causal_answers(double one_cause, int trials, Random& random) {
+  CueAnswers out = answers_of({}, trials, false, random, {});
+  constexpr double kRange = 0.36;  // of the levels of counts_of()
+  for (const double d : {-0.4, -0.2, -0.1, 0.0, 0.1, 0.2, 0.4}) {
+    CueBlock block{"", d, 1, {}};
+    for (int i = -3; i <= 3; ++i) {
+      LevelCount count{1 + 0.06 * i, trials, 0};
+      for (int t = 0; t < trials; ++t) {
+        const double standard = causal_estimate(1 - d / 2, 1 + d / 2, one_cause, kRange, random);
+        const double other = causal_estimate(count.level, count.level, one_cause, kRange, random);
+        count.successes += other > standard ? 1 : 0;
+      }
+      block.counts.push_back(count);
+    }
+    out.both.push_back(block);
+  }
+  return out;
+}
+
+TEST(Cues, CausalInferenceIsFoundAndItsPriorRecovered) {
+  for (const double one_cause : {0.3, 0.6, 0.9}) {
+    Random random(3, {static_cast<std::uint64_t>(10 * one_cause)});
+    const CueModelFit fit =
+        fit_cues(causal_answers(one_cause, 20'000, random), CueModel::causal);
+    std::printf("prior of one cause %.1f: fitted %.3f\n", one_cause, fit.weight);
+    EXPECT_NEAR(fit.weight, one_cause, 0.03);
+    EXPECT_NEAR(fit.haptic_sd, kHaptic, 0.002);
+    EXPECT_NEAR(fit.visual_sd, kVisual, 0.002);
+  }
+  constexpr int kPeople = 20;
+  int found = 0;
+  for (int i = 0; i < kPeople; ++i) {
+    Random random(11, {static_cast<std::uint64_t>(i)});
+    const CueParticipant one =
+        analyze_cues(causal_answers(0.6, 43, random), {.resamples = 0}, 0);  // 300 a condition
+    ASSERT_EQ(one.models.size(), kCueModels);
+    found += one.best == CueModel::causal ? 1 : 0;
+  }
+  std::printf("causal: %d of %d\n", found, kPeople);
+  EXPECT_GE(found, 18);
+}
+
+TEST(Cues, CausalInferenceOfOneCauseIsOptimal) {
+  Random random(5);
+  const std::vector<double> conflicts = {-0.1, -0.05, 0, 0.05, 0.1};
+  const CueAnswers answers = answers_of({}, 2'000'000, true, random, conflicts);
+  EXPECT_NEAR(fit_cues(answers, CueModel::causal).log_likelihood,
+              fit_cues(answers, CueModel::optimal).log_likelihood, 5);
+  EXPECT_GT(fit_cues(answers, CueModel::causal).weight, 0.99);
+}
+
+TEST(Cues, CausalInferenceNeedsFiveConflicts) {
+  Random random(5);
+  const auto models = [&](const std::vector<double>& conflicts) {
+    return analyze_cues(answers_of({}, 100, true, random, conflicts), {.resamples = 0}, 0)
+        .models.size();
+  };
+  EXPECT_EQ(models({-0.1, 0, 0.1, 0.1, 0}), kCueModels - 1);
+  EXPECT_EQ(models({-0.1, -0.05, 0, 0.05, 0.1}), kCueModels);
 }
 
 /// Logarithms of the smaller JND of two equal cues by the true one, mean of 40 people.

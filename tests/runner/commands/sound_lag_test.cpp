@@ -5,6 +5,7 @@
 #include <fstream>
 #include <string>
 
+#include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "runner/station/sound_timing.h"
 #include "runner/usage_error.h"

@@ -213,19 +213,20 @@ TEST(Seen, NoiseIsPiecewiseConstantAndSeeded) {
 }
 
 TEST(Seen, RecordTellsLagAndDroppedFrames) {
-  EXPECT_FALSE(participants::seen_record({}, 0));
-  std::vector<SeenFrame> frames;
+  EXPECT_FALSE(participants::seen_record({}));
+  std::vector<data::FrameRecord> frames;
   constexpr std::int64_t kStep = 16'000'000, kLag = 9'000'000, kDelay = 100'000'000;
   for (std::int64_t i = 0; i < 200; ++i) {
     if (i == 50 || i == 120 || i == 121) continue;           // dropped
     const std::int64_t pause = i < 100 ? 0 : 3'000'000'000;  // between two intervals
     const std::int64_t swap = i * kStep + pause;
-    frames.push_back({swap, swap - kDelay - (i == 10 ? 30'000'000 : kLag)});
+    frames.push_back({swap, swap - kDelay - (i == 10 ? 30'000'000 : kLag), kDelay});
   }
-  const auto record = participants::seen_record(frames, 0.1);
+  const auto record = participants::seen_record(frames);
   ASSERT_TRUE(record);
   EXPECT_EQ(record->frames, 197);
   EXPECT_EQ(record->dropped, 3);
+  EXPECT_EQ(record->first_ns, 0);
   EXPECT_NEAR(record->lag, 0.009, 1e-9);
   EXPECT_NEAR(record->lag_p99, 0.009, 1e-9);
 }
