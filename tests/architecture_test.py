@@ -145,7 +145,7 @@ PUBLIC = {
     "runner/display": "display explore_window mailbox seen text_display timeline window",
     "runner/display/scene": "camera gl_objects picture drawn_mesh image_file painter scene_drawing "
                             "scene_renderer",
-    "runner/participants": "keyboard reacher respondent seen_record simulated_settings simulated "
+    "runner/participants": "keyboard reacher respondent seen_record seen_trial simulated_settings simulated "
                            "task_participant",
     "runner/session": "device_check effect_check live_forces live_session markers recorded_outcome sample_stream session_scenes signals "
                       "preflight run_record replay session session_end simulated_study "

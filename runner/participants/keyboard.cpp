@@ -19,11 +19,10 @@
 #include <stdexcept>
 #include <utility>
 
-#include "data/base/random.h"
 #include "data/base/text.h"
 #include "protocols/answer_keys.h"
 #include "protocols/tasks/levels.h"
-#include "runner/display/seen.h"
+#include "runner/participants/seen_trial.h"
 #include "runner/scene_builder.h"
 
 namespace palpate::runner::participants {
@@ -45,31 +44,6 @@ constexpr std::int64_t kBurst_ns = 400'000'000;  // keys of one number follow ea
 using NamedKeys = std::vector<std::pair<std::string, std::string>>;
 
 /// Home and target as the screen shows them.
-/// What is seen in an interval; null: nothing.
-std::shared_ptr<const display::SeenTrial> seen_trial_of(const protocols::Protocol& protocol,
-                                                        const protocols::Trial& trial,
-                                                        const protocols::Interval& interval) {
-  if (!protocol.view || interval.stimulus < 0) return nullptr;
-  const protocols::TaskBlock& block = protocols::block_of(protocol, trial);
-  const protocols::StimulusSpec shown =
-      interval.level ? protocols::at_level(protocol, block, interval.stimulus, *interval.level)
-                     : protocol.stimuli[static_cast<std::size_t>(interval.stimulus)];
-  if (!shown.seen || !shown.seen->anything() || !protocols::is_seen(block, interval))
-    return nullptr;
-  auto out = std::make_shared<display::SeenTrial>();
-  out->view = *protocol.view;
-  out->seen = *shown.seen;
-  out->object = shown.seen->shape ? *shown.seen->shape : shown.object;
-  out->object.pose = stimuli::compose({Vec3(0), trial.orientation}, out->object.pose);
-  out->tool = tool_of(protocol.tool);
-  out->workspace = workspace_of(protocol);
-  // Of each trial its own, and the same whenever it is shown.
-  out->seed = Random(protocol.seed, {static_cast<std::uint64_t>(trial.session),
-                                     static_cast<std::uint64_t>(trial.trial)})
-                  .next();
-  return out;
-}
-
 display::ReachPicture picture_of(const protocols::ReachingSpec& reaching,
                                  const protocols::Trial& trial) {
   const auto farthest = [&](int axis) {

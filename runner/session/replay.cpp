@@ -15,6 +15,7 @@
 #include "protocols/groups.h"
 #include "protocols/parse.h"
 #include "protocols/session_plan.h"
+#include "runner/participants/seen_trial.h"
 #include "runner/scene_builder.h"
 #include "runner/servo/servo.h"
 #include "runner/session/device_check.h"
@@ -390,6 +391,21 @@ std::vector<std::optional<stimuli::ObjectSpec>> shown_objects(const protocols::P
                                      : std::optional(shown_object(protocol, trial, one)));
   }
   return shown;
+}
+
+bool is_felt(const protocols::Protocol& protocol, const data::IntervalRecord& recorded) {
+  const int stimulus = interval_of(protocol, recorded, false).stimulus;
+  return stimulus >= 0 && protocol.stimuli[static_cast<std::size_t>(stimulus)].felt;
+}
+
+std::vector<std::shared_ptr<const display::SeenTrial>> shown_sights(
+    const protocols::Protocol& protocol, const data::TrialRecord& recorded) {
+  const protocols::Trial trial = trial_of(protocol, recorded);
+  std::vector<std::shared_ptr<const display::SeenTrial>> seen;
+  for (const data::IntervalRecord& recorded_one : data::intervals_of(recorded))
+    seen.push_back(
+        participants::seen_trial_of(protocol, trial, interval_of(protocol, recorded_one, false)));
+  return seen;
 }
 
 void replay(

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -12,6 +13,7 @@
 #include "data/record.h"
 #include "data/store/store.h"
 #include "protocols/protocol.h"
+#include "runner/display/seen.h"
 #include "runner/servo/device.h"
 #include "runner/servo/sample.h"
 #include "stimuli/polygon_soup.h"
@@ -81,6 +83,14 @@ std::string to_string(const data::TrialName& name);
 /// \throws std::invalid_argument where protocol and record do not agree
 std::vector<std::optional<stimuli::ObjectSpec>> shown_objects(const protocols::Protocol& protocol,
                                                               const data::TrialRecord& recorded);
+
+/// Whether the stimulus of an interval gives forces.
+bool is_felt(const protocols::Protocol& protocol, const data::IntervalRecord& recorded);
+
+/// What was seen in each interval; null: nothing.
+/// \throws std::invalid_argument where protocol and record do not agree
+std::vector<std::shared_ptr<const display::SeenTrial>> shown_sights(
+    const protocols::Protocol& protocol, const data::TrialRecord& recorded);
 
 /// The result of a tick.
 struct ReplayedSample : servo::Sample {

@@ -24,6 +24,7 @@
 #include "data/base/text.h"
 #include "rendering/renderer.h"
 #include "runner/display/scene/drawn_mesh.h"
+#include "runner/display/seen.h"
 #include "runner/safety/fault_signals.h"
 #include "runner/scene_builder.h"
 #include "runner/session/replay.h"
@@ -318,9 +319,20 @@ class PageBuilder {
     return meshes_.size() - 1;
   }
 
+  /// The object as it was seen, without noise: to be drawn beside the felt one.
+  Json seen_json(const display::SeenTrial& sight, const std::string& label) {
+    display::SeenTrial steady = sight;
+    steady.seen.noise = 0;
+    draws_seen_ = true;
+    return {{"mesh", add_mesh(sight.object, label + ", as it was seen")},
+            {"pose", pose_json(display::drawn_pose(steady, 0))},
+            {"scale", sight.seen.size_ratio}};
+  }
+
   Json parts_json(const session::RecordedTrial& trial, const ShownTicks& ticks, bool other) {
     const data::TrialRecord& record = trial.stored.record;
     const auto objects = session::shown_objects(trial.protocol, record);
+    const auto sights = session::shown_sights(trial.protocol, record);
     const std::vector<data::IntervalRecord> intervals = data::intervals_of(record);
     Json parts = Json::array();
     for (std::size_t i = 0; i < ticks.intervals.size(); ++i) {
@@ -331,10 +343,12 @@ class PageBuilder {
                    {"label", "interval " + std::to_string(i + 1) + ": " + label + ", " +
                                  renderer_words(intervals[i].renderer, other)},
                    {"mesh", nullptr}};
-      if (objects[i] && objects[i]->shape != stimuli::ShapeKind::none) {
+      if (objects[i] && objects[i]->shape != stimuli::ShapeKind::none &&
+          session::is_felt(trial.protocol, intervals[i])) {
         part["mesh"] = add_mesh(*objects[i], label);
         part["pose"] = pose_json(objects[i]->pose);
       }
+      if (sights[i] && sights[i]->seen.object) part["seen"] = seen_json(*sights[i], label);
       parts.push_back(std::move(part));
     }
     return parts;
@@ -461,7 +475,9 @@ class PageBuilder {
            "<li><i class=\"l-virtual\"></i>tool in the hand</li>"
            "<li><i class=\"l-ideal\"></i>ideal tool, kept outside</li>"
            "<li><i class=\"l-force\"></i>force on the hand, from the contact</li>"
-           "<li><i class=\"l-touch\"></i>in contact</li></ul>\n</header>\n<main>\n"
+           "<li><i class=\"l-touch\"></i>in contact</li>" +
+           (draws_seen_ ? "<li><i class=\"l-seen\"></i>object as it was seen</li>" : "") +
+           "</ul>\n</header>\n<main>\n"
            "<p id=\"loading\">This page draws with JavaScript.</p>\n"
            "<div id=\"controls\" class=\"controls\" hidden=\"hidden\">"
            "<button type=\"button\" id=\"play\">Play</button>"
@@ -497,6 +513,7 @@ class PageBuilder {
   bool compare_;
   std::size_t most_triangles_ = kMostTriangles;
   std::vector<Json> meshes_, shows_;
+  bool draws_seen_ = false;  ///< an object beside the felt one
   TrialPage page_;
 };
 

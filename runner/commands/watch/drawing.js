@@ -181,7 +181,11 @@ const palpate_drawing = (() => {
         draw(kUnits.cone, along(neck, by, 0.07 * radius, head), colours.force, opacity);
       };
       gl.depthFunc(gl.LEQUAL);
-      for (const one of moment.objects ?? (moment.mesh ? [moment] : [])) draw(one.mesh.vertices, one.object, colours.object, 1);
+      for (const one of moment.objects ?? (moment.mesh ? [moment] : [])) {
+        if (one.opacity) gl.enable(gl.CULL_FACE);  // what shines through has no back
+        draw(one.mesh.vertices, one.object, colours[one.colour ?? 'object'], one.opacity ?? 1);
+        gl.disable(gl.CULL_FACE);
+      }
       // Parts inside or behind the object show through.
       gl.depthFunc(gl.GREATER);
       gl.depthMask(false);

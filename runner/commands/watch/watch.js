@@ -86,13 +86,19 @@
       const f = {x, y: cross(z, x), z, o: a};
       return show.tool.map(([from, to]) => [placed(f, from), placed(f, to)]);
     };
+    const felt = part.mesh === null ? null : {mesh: meshes[part.mesh], object};
+    const seen = part.seen ? {mesh: meshes[part.seen.mesh], object: scaled(frame(part.seen.pose), part.seen.scale)} : null;
     return {
-      t: c.t[i], part, object, mesh: part.mesh === null ? null : meshes[part.mesh],
+      t: c.t[i], part, felt, seen, objects: [...(felt ? [felt] : []), ...(seen ? [{...seen, colour: 'virtual', opacity: 0.3}] : [])],
       virtual: lines(tip, tail), ideal: lines(ideal_tip, ideal_tail),
       force: v3(c, 'force', i), depth: c.depth[i], contacts: c.contacts[i],
       contact: c.contacts[i] > 0 ? add(ideal_tip, v3(c, 'contact', i)) : null,
       type: given.types[c.type[i]], faults: given.faults.filter(([bit]) => (c.faults[i] & bit) !== 0),
     };
+  }
+
+  function scaled(f, by) {
+    return {x: times(by, f.x), y: times(by, f.y), z: times(by, f.z), o: f.o};
   }
 
   // The size of all objects, so that pictures side by side have one scale.
@@ -101,9 +107,13 @@
   for (const show of shows) {
     for (const f of show.magnitude) strongest = Math.max(strongest, f);
     for (const part of show.parts) {
-      if (part.mesh === null) continue;
-      const f = frame(part.pose);
-      for (const corner of meshes[part.mesh].corners) outline.push(placed(f, corner));
+      if (part.mesh !== null) {
+        const f = frame(part.pose);
+        for (const corner of meshes[part.mesh].corners) outline.push(placed(f, corner));
+      }
+      if (!part.seen) continue;
+      const f = scaled(frame(part.seen.pose), part.seen.scale);
+      for (const corner of meshes[part.seen.mesh].corners) outline.push(placed(f, corner));
     }
   }
   if (!outline.length) outline.push([-0.03, 0, 0], [0.03, 0, 0]);
@@ -144,7 +154,7 @@
       node('rect', {x: view.x, y: view.y, width: 200, height: 150}, defs);
       const g = node('g', {'clip-path': `url(#${clip})`}, svg);
       const out = {view};
-      for (const kind of ['object', 'crease', 'virtual', 'ideal', 'force'])
+      for (const kind of ['object', 'crease', 'seen', 'virtual', 'ideal', 'force'])
         out[kind] = node('path', {class: kind}, g);
       out.contact = node('circle', {class: 'contact', r: 4}, g);
       node('rect', {class: 'frame', x: view.x, y: view.y, width: 200, height: 150}, svg);
@@ -165,9 +175,8 @@
           return px(view.x + 100 + scale * dot(d, view.right)) + ' ' + px(view.y + 75 - scale * dot(d, view.up));
         };
         if (!still) {
-          const {mesh, object} = moment;
-          let fill = '', lines = '';
-          if (mesh) {
+          const outlined = ({mesh, object}) => {
+            let fill = '', lines = '';
             const where = mesh.corners.map(corner => at(placed(object, corner)));
             const front = mesh.units.map(n => dot(turned(object, n), into) < 1e-9);
             mesh.triangles.forEach((t, i) => {
@@ -175,9 +184,12 @@
             });
             for (const [a, b, one, two, crease] of mesh.edges)
               if (front[one] !== front[two] || (crease && front[one])) lines += 'M' + where[a] + 'L' + where[b];
-          }
-          panel.object.setAttribute('d', fill);
-          panel.crease.setAttribute('d', lines);
+            return {fill, lines};
+          };
+          const felt = moment.felt ? outlined(moment.felt) : {fill: '', lines: ''};
+          panel.object.setAttribute('d', felt.fill);
+          panel.crease.setAttribute('d', felt.lines);
+          panel.seen.setAttribute('d', moment.seen ? outlined(moment.seen).lines : '');
         }
         const path = lines => lines.map(([a, b]) => 'M' + at(a) + 'L' + at(b)).join('');
         panel.virtual.setAttribute('d', path(moment.virtual));
