@@ -10,6 +10,7 @@
 #include <cstring>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -76,7 +77,6 @@ class PageLayout {
         page_(page),
         width_(width),
         over_scene_(options.over_scene),
-        height_(height),
         unit_(std::max({2.0, std::min(height / 34, width / 46),
                         std::min({kSmallestUnit * options.ui_scale, height / 16, width / 20})})),
         keys_(canvas, page, unit_, 0.94 * width, kMostKeys * height) {
@@ -104,7 +104,20 @@ class PageLayout {
   }
 
   void draw(int screen) const {
-    if (over_scene_) draw_bands();
+    if (!over_scene_) return draw_content(screen);
+    cairo_push_group(canvas_);
+    draw_content(screen);
+    const std::unique_ptr<cairo_pattern_t, decltype(&cairo_pattern_destroy)> content(
+        cairo_pop_group(canvas_), &cairo_pattern_destroy);
+    draw_halo(content.get());
+    cairo_set_source(canvas_, content.get());
+    cairo_paint(canvas_);
+  }
+
+ private:
+  static constexpr double kWordsAbove = 0.15;  // share of the room
+
+  void draw_content(int screen) const {
     const auto last = static_cast<int>(screens().size()) - 1;
     const bool answers = !page_.keys.empty() && screen >= last;
     if (answers || page_.kind != Page::Kind::text)
@@ -137,18 +150,20 @@ class PageLayout {
     }
   }
 
- private:
-  static constexpr double kWordsAbove = 0.15;  // share of the room
-
-  /// What is behind the words and the keys is dark enough to read them.
-  void draw_bands() const {
-    constexpr double kDark = 0.8;
-    cairo_set_source_rgba(canvas_, kGround.red, kGround.green, kGround.blue, kDark);
-    cairo_rectangle(canvas_, 0, 0, width_, top_ + kWordsAbove * room_);
-    const double keys = page_.keys.empty() ? reply_top_ : keys_top_ - unit_;
-    if (!page_.keys.empty() || !page_.reply.empty())
-      cairo_rectangle(canvas_, 0, keys, width_, height_ - keys);
-    cairo_fill(canvas_);
+  /// Words and keys are read on any scene, and hide no more of it than they need.
+  void draw_halo(cairo_pattern_t* content) const {
+    constexpr int kDirections = 16;
+    const double reach = 0.25 * unit_;
+    for (int i = 0; i < kDirections; ++i) {
+      const double angle = 2 * std::numbers::pi * i / kDirections;
+      for (const double part : {0.5, 1.0}) {
+        cairo_save(canvas_);
+        cairo_translate(canvas_, part * reach * std::cos(angle), part * reach * std::sin(angle));
+        cairo_set_source_rgba(canvas_, kGround.red, kGround.green, kGround.blue, 0.3);
+        cairo_mask(canvas_, content);
+        cairo_restore(canvas_);
+      }
+    }
   }
 
   void draw_line(const std::string& text, double size, double top, const Colour& colour) const {
@@ -182,7 +197,7 @@ class PageLayout {
   const Page& page_;
   double width_;
   bool over_scene_;
-  double height_, unit_;
+  double unit_;
   KeyMap keys_;
   double continue_top_ = 0, keys_top_ = 0, reply_top_ = 0, count_top_ = 0, top_ = 0, room_ = 0;
   double typed_top_ = 0, picture_ = 0, picture_top_ = 0;
