@@ -6,6 +6,7 @@ Usage: seen_windows_test.py PALPATE     (PALPATE_PICTURES names a folder for pic
 
 import csv
 import json
+import math
 import subprocess
 import time
 import unittest
@@ -115,6 +116,35 @@ class SeenWindows(WindowCase):
         found = self.seen_box("seen_larger", size_ratio=1.3, offset_m=[0.03, 0, -0.01])
         self.assert_at(found, box_of(ratio=1.3, offset=(0.03, 0, -0.01)))
 
+    def assert_blur(self, blur_deg):
+        self.start(protocol(stimulus("a", what="object", blur_deg=blur_deg)))
+        wait_for("the object", lambda: any(map(self.is_object, self.look("seen_blur"))))
+        pixels = self.look("seen_blur")
+        left, top, width, height = self.part()
+        box = box_of()
+        row = int(top + (box[2] + 0.6 * (box[3] - box[2])) * height)
+        line = [sum(pixels[row * self.width + x]) for x in range(self.width)]
+        # The left edge of the front is a step, blurred a cumulative normal: 2 sd between 16 and 84 %. The face is shaded
+        # beyond.
+        expected = math.tan(math.radians(blur_deg)) * (SCREEN[0][1] - EYE[1]) * width / (SCREEN[1][0] - SCREEN[0][0])
+        edge = left + box[0] * width
+        near = line[int(edge - 4 * expected):int(edge + 4 * expected)]
+        low, high = near[0], max(near)
+
+        def crossing(portion):
+            level = low + portion * (high - low)
+            at = next(i for i, value in enumerate(near) if value >= level)
+            return at + (level - near[at]) / (near[at] - near[at - 1])
+        sd = (crossing(0.8413) - crossing(0.1587)) / 2
+        self.assertLess(abs(sd / expected - 1), 0.06, (sd, expected))
+        self.assertLess(abs(crossing(0.5) + int(edge - 4 * expected) + 0.5 - edge), 1)
+
+    def test_small_blur_has_its_standard_deviation(self):
+        self.assert_blur(0.3)
+
+    def test_large_blur_has_its_standard_deviation(self):
+        self.assert_blur(0.6)
+
     def test_mirror_flips_the_picture(self):
         left, right, top, bottom = box_of()
         self.assert_at(self.seen_box("seen_mirror", {"mirror": "horizontal"}), (1 - right, 1 - left, top, bottom))
@@ -165,15 +195,23 @@ class SeenWindows(WindowCase):
             time.sleep(0.5)
 
     def test_lag_of_the_frames_is_on_record(self):
-        self.start(protocol(stimulus("a", what=["object", "tool"], delay_s=0.1), stimulus("b")))
+        self.start(protocol(stimulus("a", what=["object", "tool"], delay_s=0.1), stimulus("b")) | {"samples": True})
         for before in range(2):
             self.look(f"seen_record_{before}")
+            time.sleep(3)  # several frames of a busy machine
             self.answer(before)
         tasks = {json.loads(task)["intervals"][0]["stimulus"]: json.loads(task) for (task,) in
                  self.rows("SELECT task FROM attempts WHERE state = 'completed'")}
         self.assertNotIn("seen", tasks["b"])
         self.assertGreater(tasks["a"]["seen"]["frames"], 3)
         self.assertGreater(tasks["a"]["seen"]["lag_s"], 0)
+        frames = self.rows("SELECT swap_ns, pose_ns, delay_ns FROM frames ORDER BY frame")
+        self.assertEqual(len(frames), tasks["a"]["seen"]["frames"])
+        self.assertEqual(frames[0][0], tasks["a"]["seen"]["first_ns"])
+        for (swap, pose, delay), later in zip(frames, frames[1:]):
+            self.assertLess(swap, later[0])
+            self.assertEqual(delay, 100_000_000)
+            self.assertGreaterEqual(swap - pose, delay)
         self.assertLessEqual(tasks["a"]["seen"]["lag_s"], tasks["a"]["seen"]["lag_p99_s"])
         self.stop()
         table = self.folder / "trials.csv"
