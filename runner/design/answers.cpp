@@ -1,8 +1,12 @@
 #include "runner/design/answers.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
+#include <cstdint>
 #include <glm/common.hpp>
+#include <glm/gtc/quaternion.hpp>
+#include <glm/trigonometric.hpp>
 #include <limits>
 #include <set>
 #include <utility>
@@ -13,12 +17,16 @@
 #include "protocols/groups.h"
 #include "protocols/parse.h"
 #include "protocols/schedule.h"
+#include "protocols/tasks/block_order.h"
+#include "protocols/tasks/levels.h"
 #include "protocols/tasks/texts.h"
+#include "runner/design/surface_marks.h"
 #include "runner/scene_builder.h"
 #include "runner/station/protocol_check.h"
 #include "runner/study/task_words.h"
 #include "runner/touch/checked_meshes.h"
 #include "runner/touch/trial_page.h"
+#include "runner/usage_error.h"
 #include "stimuli/polygon_soup.h"
 
 namespace palpate::runner::design {
@@ -34,12 +42,26 @@ Json as_json(const Vec3& v) {
   return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
 }
 
-/// \throws protocols::InputError with every fault, also of meshes
-Protocol checked(const std::string& text, const std::string& path, SceneBuilder& builder) {
-  Protocol protocol = protocols::parse_protocol_text(text, path);
+/// \throws protocols::InputError with every fault
+void require_meshes(const Protocol& protocol, const std::string& path, SceneBuilder& builder) {
   const std::vector<protocols::Fault> faults = touch::mesh_faults(protocol, path, builder);
   if (!faults.empty()) throw protocols::InputError(faults);
-  return protocol;
+}
+
+bool reads_files(const stimuli::ObjectSpec& object) {
+  using stimuli::TextureSpec;
+  return object.shape == stimuli::ShapeKind::mesh ||
+         (object.texture && object.texture->kind == TextureSpec::Kind::image) ||
+         std::ranges::any_of(object.parts,
+                             [](const stimuli::ObjectSpec& part) { return reads_files(part); });
+}
+
+/// Whether another program may change what is built of it.
+bool reads_files(const Protocol& protocol) {
+  return std::ranges::any_of(protocol.stimuli, [](const protocols::StimulusSpec& stimulus) {
+    return reads_files(stimulus.object) ||
+           (stimulus.seen && stimulus.seen->shape && reads_files(*stimulus.seen->shape));
+  });
 }
 
 Json in_words(const Protocol& protocol) {
@@ -50,10 +72,8 @@ Json in_words(const Protocol& protocol) {
   return out;
 }
 
-Json picture_of(const stimuli::ObjectSpec& object, std::size_t most) {
-  Json out{{"corners", Json::array()}, {"triangles", Json::array()}};
-  if (object.shape == stimuli::ShapeKind::none) return out;
-  const touch::PictureMesh mesh = touch::picture_mesh(object, most);
+void put_mesh(const touch::PictureMesh& mesh, Json& out) {
+  out["corners"] = Json::array();
   Vec3 low(std::numeric_limits<double>::max()), high(-std::numeric_limits<double>::max());
   for (const Vec3& corner : mesh.corners) {
     low = glm::min(low, corner);
@@ -62,18 +82,84 @@ Json picture_of(const stimuli::ObjectSpec& object, std::size_t most) {
   }
   out["triangles"] = mesh.triangles;
   out["size_m"] = as_json(high - low);
+}
+
+/// "/fields/0" as a picture needs it.
+Json as_json(const stimuli::FieldSpec& field) {
+  using Kind = stimuli::FieldSpec::Kind;
+  constexpr std::array kNames = {"constant", "spring", "channel", "viscous", "curl", "vibration"};
+  Json out{{"kind", kNames[static_cast<std::size_t>(field.kind)]}};
+  switch (field.kind) {
+    case Kind::constant:
+      out["force_n"] = as_json(field.force);
+      break;
+    case Kind::channel:
+      out["to_m"] = as_json(field.to);
+      [[fallthrough]];
+    case Kind::spring:
+      out["centre_m"] = as_json(field.centre);
+      out["radius_m"] = field.radius;
+      break;
+    case Kind::curl:
+      out["turns"] = field.damping[0][0] < 0 ? -1 : field.damping[0][0] > 0 ? 1 : 0;
+      [[fallthrough]];
+    case Kind::vibration:
+      out["axis"] = as_json(field.axis);
+      break;
+    case Kind::viscous:
+      break;
+  }
+  return out;
+}
+
+Json marks_of(const stimuli::ObjectSpec& object, const touch::PictureMesh& mesh) {
+  SceneBuilder builder;
+  const auto texture = builder.texture_of(object);
+  if (!texture) return nullptr;
+  const SurfaceMarks marks = surface_marks(object, *texture, mesh.corners, mesh.triangles);
+  Json out{{"every", marks.every}, {"lines", Json::array()}, {"dots", Json::array()}};
+  for (const auto& [from, to] : marks.lines) out["lines"].push_back({as_json(from), as_json(to)});
+  for (const Vec3& dot : marks.dots) out["dots"].push_back(as_json(dot));
+  return out;
+}
+
+/// What is seen, if it looks other than what is felt; null: it does not.
+Json seen_of(const protocols::StimulusSpec& stimulus, std::size_t most) {
+  if (!stimulus.seen || !stimulus.seen->object) return nullptr;
+  const protocols::SeenSpec& seen = *stimulus.seen;
+  const bool moved = seen.size_ratio != 1 || seen.turn_deg != 0 || seen.offset != Vec3(0);
+  if (!seen.shape && !moved && stimulus.felt) return nullptr;
+  const stimuli::ObjectSpec& object = seen.shape ? *seen.shape : stimulus.object;
+  if (object.shape == stimuli::ShapeKind::none) return nullptr;
+  touch::PictureMesh mesh = touch::picture_mesh(object, most);
+  const Quat turn = glm::angleAxis(glm::radians(seen.turn_deg), seen.axis);
+  for (Vec3& corner : mesh.corners) corner = turn * (seen.size_ratio * corner);
+  Json out;
+  put_mesh(mesh, out);
+  return out;
+}
+
+/// A stimulus in a cell that looks like one that is shown already is left out.
+Json picture_of(const stimuli::ObjectSpec& object, std::size_t most) {
+  Json out{{"corners", Json::array()}, {"triangles", Json::array()}};
+  for (const stimuli::FieldSpec& field : object.fields) out["fields"].push_back(as_json(field));
+  if (object.shape == stimuli::ShapeKind::none) return out;
+  const touch::PictureMesh mesh = touch::picture_mesh(object, most);
+  put_mesh(mesh, out);
+  if (Json marks = marks_of(object, mesh); !marks.is_null()) out["marks"] = std::move(marks);
   // Primitives look the same with fewer.
   if (object.shape == stimuli::ShapeKind::mesh && mesh.all_triangles > mesh.triangles.size())
     out["all_triangles"] = mesh.all_triangles;
   return out;
 }
 
-/// A stimulus in a cell that looks like one that is shown already is left out.
 Json pictures_of(const std::vector<protocols::StimulusSpec>& stimuli) {
   Json out = Json::array();
   std::set<std::string> known;
   for (const protocols::StimulusSpec& stimulus : stimuli) {
-    Json picture = picture_of(stimulus.object, kMostTriangles / stimuli.size() + 1);
+    const std::size_t most = kMostTriangles / stimuli.size() + 1;
+    Json picture = picture_of(stimulus.object, most);
+    if (Json seen = seen_of(stimulus, most); !seen.is_null()) picture["seen"] = std::move(seen);
     const std::string base = base_name(stimulus.name);
     const bool is_new = known.insert(base + picture.dump()).second;
     if (!is_new && base != stimulus.name) continue;
@@ -117,15 +203,41 @@ Json trials_of(const Protocol& protocol, int participant) {
   return out;
 }
 
+/// Builds what the library builds, in a builder that outlives it. Faults are the library's to tell.
+void build_shapes(const Protocol& protocol, SceneBuilder& builder) {
+  for (const protocols::StimulusSpec& stimulus : protocols::with_all_levels(protocol).stimuli) {
+    if (stimulus.object.soft) continue;  // nothing of it is kept
+    try {
+      for (const bool sides : {false, true}) builder.build({stimulus.object}, sides);
+    } catch (const stimuli::MeshError&) {
+      return;
+    }
+  }
+}
+
 }  // namespace
 
-Json check_answer(const std::string& text, const std::string& path) {
+SceneBuilder& BuiltShapes::for_protocol(const Protocol& protocol) {
+  constexpr int kMostChecks = 100;
+  const bool files = reads_files(protocol) ||
+                     std::ranges::any_of(protocol.group_protocols,
+                                         [](const auto& group) { return reads_files(*group); });
+  if (files || ++checks_ > kMostChecks) {
+    builder_ = SceneBuilder();
+    checks_ = 0;
+  }
+  return builder_;
+}
+
+Json check_answer(const std::string& text, const std::string& path, BuiltShapes& shapes) {
   std::vector<protocols::Fault> faults;
   try {
-    SceneBuilder builder;
-    const Protocol protocol = checked(text, path, builder);
+    const Protocol protocol = protocols::parse_protocol_text(text, path);
+    SceneBuilder& builder = shapes.for_protocol(protocol);
+    require_meshes(protocol, path, builder);
     const std::vector<std::string> notes = touch::stimulus_notes(protocol, builder);
-    const StimulusLibrary library(protocol, std::move(builder));
+    build_shapes(protocol, builder);
+    const StimulusLibrary library(protocol, builder);
     Json out = station::protocol_json(path, protocol, library, {}, notes);
     out["in_words"] = in_words(protocol);
     out["built_in_texts"] = protocols::built_in_texts(protocol);
@@ -148,6 +260,19 @@ Json picture_answer(const std::string& text, const std::string& path) {
     stylus["segments"].push_back({as_json(segment.from), as_json(segment.to)});
   if (protocol.reach) stylus["reach"] = protocol.reach->factor;
   return out;
+}
+
+Json recover_answer(const std::string& text, const std::string& path, const std::string& block,
+                    int participants) {
+  Protocol protocol = protocols::parse_protocol_text(text, path);
+  std::erase_if(protocol.blocks, [&](const protocols::TaskBlock& one) {
+    return one.name != block || one.procedures.empty();
+  });
+  for (protocols::TaskBlock& one : protocol.blocks) one.practice = false;
+  if (protocol.blocks.empty() || !protocols::is_adaptive(protocol.blocks.front()))
+    throw UsageError("The levels of this block do not follow the answers: nothing is estimated.");
+  constexpr std::uint64_t kSeed = 1;  // as the command's
+  return read_ordered_json(study::recovery_text(protocol, participants, kSeed, "json"));
 }
 
 Json schedule_answer(const std::string& text, const std::string& path, int participant) {

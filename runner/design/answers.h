@@ -5,17 +5,40 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "protocols/protocol.h"
+#include "runner/scene_builder.h"
+
 namespace palpate::runner::design {
+
+/// Meshes with their search trees that answers have built: what most edits leave as it is.
+class BuiltShapes {
+ public:
+  /// Without what may have changed or is of no use any more.
+  SceneBuilder& for_protocol(const protocols::Protocol& protocol);
+
+ private:
+  SceneBuilder builder_;
+  int checks_ = 0;  ///< that it has served: then it is made anew, so that it does not grow for ever
+};
 
 /// The faults of a protocol, or none with "summary", "devices", "duration_s" as palpate validate
 /// --json gives them, and its blocks "in_words".
-/// \param path  named in faults; mesh files are in its folder
-nlohmann::ordered_json check_answer(const std::string& text, const std::string& path);
+/// \param path  named in faults; mesh files are in its folder. \param shapes  of earlier answers:
+/// most edits leave them as they are
+nlohmann::ordered_json check_answer(const std::string& text, const std::string& path,
+                                    BuiltShapes& shapes);
 
-/// The surfaces of the stimuli in their own frames, m, and the stylus that touches them:
-/// {"stimuli":
-/// [{"name", "corners", "triangles", "size_m"}], "stylus": {...}}. \throws as parse_protocol_text
+/// The surfaces of the stimuli in their own frames, m, with what is drawn on and about them, and
+/// the stylus that touches them: {"stimuli": [{"name", "corners", "triangles", "size_m", "marks":
+/// as surface_marks, "fields": [...], "seen": another shape, place or size, as a stimulus}],
+/// "stylus":
+/// {...}}. \throws as parse_protocol_text
 nlohmann::ordered_json picture_answer(const std::string& text, const std::string& path);
+
+/// What 'palpate schedule --recover' finds of the procedures of a block: {"procedures": [...]}.
+/// \throws as parse_protocol_text; UsageError: they find no threshold
+nlohmann::ordered_json recover_answer(const std::string& text, const std::string& path,
+                                      const std::string& block, int participants);
 
 /// The trials of a participant, a row each: {"columns": [...], "rows": [[...], ...], "group",
 /// "all"}. \throws as parse_protocol_text

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <filesystem>
 #include <fstream>
+#include <glm/common.hpp>
+#include <limits>
 #include <string_view>
 #include <system_error>
 #include <vector>
@@ -18,6 +20,7 @@
 #include "runner/touch/scene_notes.h"
 #include "runner/usage_error.h"
 #include "stimuli/mesh_file.h"
+#include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::runner::design {
 namespace {
@@ -46,6 +49,16 @@ bool is_language(const std::string& code) {
          std::ranges::all_of(code, [](char c) { return is_letter_or_digit(c) || c == '-'; });
 }
 
+Vec3 solid_size(const stimuli::ObjectSpec& object) {
+  const stimuli::SolidMesh solid = stimuli::solid_of_file(object);
+  Vec3 low(std::numeric_limits<double>::max()), high = -low;
+  for (const Vec3& node : solid.nodes) {
+    low = glm::min(low, node);
+    high = glm::max(high, node);
+  }
+  return high - low;
+}
+
 }  // namespace
 
 double proposed_scale(double largest) {
@@ -61,15 +74,15 @@ double proposed_scale(double largest) {
 Json add_mesh(const ProtocolFile& file, const std::string& folder, const std::string& name,
               const std::string& bytes) {
   const std::string plain = plain_name(name);
-  if (!stimuli::is_mesh_file_name(plain) || stimuli::is_gmsh_file_name(plain))
-    throw UsageError(printable(name) +
-                     ": expected a mesh, .obj, .stl, .gltf, .glb, .ply, .off or .3mf");
+  const bool is_solid = stimuli::is_gmsh_file_name(plain);
+  if (!stimuli::is_mesh_file_name(plain) && !is_solid)
+    throw UsageError(printable(name) + ": expected a mesh, " + stimuli::kMeshExtensions +
+                     ", or a solid, .msh");
   const std::string draft = folder + "/" + plain;
   std::ofstream(draft, std::ios::binary) << bytes;
   const protocols::SceneSpec scene = protocols::parse_scene(draft);
   stimuli::ObjectSpec object = scene.objects.front();
-  SceneBuilder builder;
-  const Vec3 size = builder.mesh(object).size;
+  const Vec3 size = is_solid ? solid_size(object) : SceneBuilder().mesh(object).size;
   const double largest = std::max({size.x, size.y, size.z});
   const double scale = stimuli::has_unit(plain) ? 1 : proposed_scale(largest);
   object.scale = scale;
@@ -78,17 +91,15 @@ Json add_mesh(const ProtocolFile& file, const std::string& folder, const std::st
   std::error_code ignored;
   fs::remove(draft, ignored);
   const std::string kept = save_beside(file.folder() + "/" + plain, bytes);
-  return {{"file", kept},
-          {"scale", scale},
-          {"size_m", {scale * size.x, scale * size.y, scale * size.z}},
-          {"notes", notes}};
+  Json out{{"file", kept},
+           {"scale", scale},
+           {"size_m", {scale * size.x, scale * size.y, scale * size.z}},
+           {"notes", notes}};
+  if (is_solid) out["soft"] = {{"young_pa", object.soft->young}};
+  return out;
 }
 
-Json texts_answer(const std::string& text, const ProtocolFile& file) {
-  Json out{{"texts", Json::array()}, {"languages", Json::array()}};
-  for (const auto& [key, original] :
-       protocols::texts_of(protocols::parse_protocol_text(text, file.path())))
-    out["texts"].push_back({key, original});
+std::vector<std::string> languages_of(const ProtocolFile& file) {
   const std::string begin = fs::path(file.path()).stem().string() + ".texts.", end = ".json";
   std::vector<std::string> languages;
   std::error_code error;
@@ -101,7 +112,14 @@ Json texts_answer(const std::string& text, const ProtocolFile& file) {
     if (is_language(language)) languages.push_back(language);
   }
   std::ranges::sort(languages);
-  out["languages"] = languages;
+  return languages;
+}
+
+Json texts_answer(const std::string& text, const ProtocolFile& file) {
+  Json out{{"texts", Json::array()}, {"languages", languages_of(file)}};
+  for (const auto& [key, original] :
+       protocols::texts_of(protocols::parse_protocol_text(text, file.path())))
+    out["texts"].push_back({key, original});
   return out;
 }
 

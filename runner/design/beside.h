@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "runner/design/protocol_file.h"
 
@@ -13,7 +14,8 @@ namespace palpate::runner::design {
 /// Copies a mesh beside the protocol, under its own name or a free one like it.
 /// \param name  as the user's computer calls it. \param folder  for a draft: nothing is written
 /// beside the protocol unless palpate can read it. \return {"file", "scale": proposed, "size_m": at
-/// that scale, "notes"}. \throws UsageError, stimuli::MeshError, protocols::InputError, NotSaved
+/// that scale, "notes", "soft": of a solid, what makes it one}. \throws UsageError,
+/// stimuli::MeshError, protocols::InputError, NotSaved
 nlohmann::ordered_json add_mesh(const ProtocolFile& file, const std::string& folder,
                                 const std::string& name, const std::string& bytes);
 
@@ -21,7 +23,10 @@ nlohmann::ordered_json add_mesh(const ProtocolFile& file, const std::string& fol
 /// 0.001 for millimetres, 0.0254 for inches. \param largest  in the file's unit
 double proposed_scale(double largest);
 
-/// {"texts": [[key, original], ...], "languages": of the translations that are there}
+/// Of the translations that are there.
+std::vector<std::string> languages_of(const ProtocolFile& file);
+
+/// {"texts": [[key, original], ...], "languages": as languages_of}
 nlohmann::ordered_json texts_answer(const std::string& text, const ProtocolFile& file);
 
 /// "NAME.texts.LANGUAGE.json" beside the protocol. \throws UsageError: "de", "pt-BR" are languages

@@ -10,9 +10,9 @@
 #include "data/base/json_text.h"
 #include "data/base/text.h"
 #include "protocols/parse.h"
-#include "runner/design/answers.h"
 #include "runner/design/beside.h"
 #include "runner/design/page_assets.h"
+#include "runner/design/study_data.h"
 #include "runner/serve/loopback.h"
 #include "runner/usage_error.h"
 
@@ -22,7 +22,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using serve::PageAnswer;
 
-constexpr int kMostParticipants = 40, kMostNumber = 1'000'000;
+constexpr int kMostParticipants = 40, kMostNumber = 1'000'000, kMostRecovered = 10'000;
 
 PageAnswer plain(unsigned status, const std::string& text) {
   return {status, "text/plain; charset=utf-8", text + "\n"};
@@ -37,6 +37,13 @@ std::string text_in(const nlohmann::json& values, const char* key) {
   if (found == values.end() || !found->is_string())
     throw UsageError(std::string(key) + ": expected a text");
   return *found;
+}
+
+/// \throws UsageError
+std::string bytes_in(const nlohmann::json& values) {
+  std::optional<std::string> bytes = base64_decoded(text_in(values, "bytes"));
+  if (!bytes) throw UsageError("bytes: expected base64");
+  return std::move(*bytes);
 }
 
 int number_in(const nlohmann::json& values, const char* key, int usual, int most) {
@@ -84,11 +91,17 @@ std::string_view text_of_asset(std::span<const Asset> assets, std::string_view n
   return "";
 }
 
-DesignPage::DesignPage(const ProtocolFile& file, const TemporaryFolder& folder)
-    : file_(file), folder_(folder), rehearsal_(folder) {}
+DesignPage::DesignPage(const ProtocolFile& file, const TemporaryFolder& folder,
+                       std::vector<std::string> databases)
+    : file_(file),
+      folder_(folder),
+      databases_(std::move(databases)),
+      rehearsal_(folder),
+      uploads_(folder.path()) {}
 
 bool DesignPage::is_slow(const std::string& target) {
-  return target == "/check" || target == "/picture" || target == "/schedule";
+  return target == "/check" || target == "/picture" || target == "/schedule" || target == "/data" ||
+         target == "/recover";
 }
 
 PageAnswer DesignPage::get(const std::string& target) {
@@ -139,18 +152,25 @@ PageAnswer DesignPage::post(const std::string& target, const std::string& body) 
 Json DesignPage::answer(const std::string& message, const nlohmann::json& values) {
   if (message == "open") return opened(file_);
   if (message == "progress") return rehearsal_.progress();
-  if (message == "mesh") {
-    const std::optional<std::string> bytes = base64_decoded(text_in(values, "bytes"));
-    if (!bytes) throw UsageError("bytes: expected base64");
-    return add_mesh(file_, folder_.path(), text_in(values, "name"), *bytes);
-  }
+  if (message == "upload") return {{"upload", uploads_.begin()}};
+  if (message == "part")
+    return {{"bytes", uploads_.add(text_in(values, "upload"), bytes_in(values))}};
+  if (message == "mesh")
+    return add_mesh(
+        file_, folder_.path(), text_in(values, "name"),
+        values.contains("upload") ? uploads_.take(text_in(values, "upload")) : bytes_in(values));
+  if (message == "languages") return {{"languages", languages_of(file_)}};
   if (message == "translation") return translation_of(file_, text_in(values, "language"));
   if (message == "stop") {
     rehearsal_.stop();
     return rehearsal_.progress();
   }
   const std::string text = text_in(values, "text"), &path = file_.path();
-  if (message == "check") return check_answer(text, path);
+  if (message == "check") return check_answer(text, path, shapes_);
+  if (message == "data") return {{"data", study_data(text, file_, databases_)}};
+  if (message == "recover")
+    return recover_answer(text, path, text_in(values, "block"),
+                          number_in(values, "participants", 200, kMostRecovered));
   if (message == "picture") return picture_answer(text, path);
   if (message == "schedule")
     return schedule_answer(text, path, number_in(values, "participant", 1, kMostNumber));

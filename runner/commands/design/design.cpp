@@ -4,8 +4,10 @@
 #include <cstdlib>
 #include <fstream>
 #include <iostream>
+#include <vector>
 
 #include "data/base/text.h"
+#include "data/store/store.h"
 #include "runner/commands/shared/command.h"
 #include "runner/design/design_page.h"
 #include "runner/design/protocol_file.h"
@@ -48,7 +50,7 @@ void open_browser(const std::string& address, const design::TemporaryFolder& fol
 
 int design_command(const std::vector<std::string>& args) {
   CommandLine line;
-  line.usage = "palpate design [PROTOCOL.json] [--port N] [--no-browser]";
+  line.usage = "palpate design [PROTOCOL.json] [--db FILE] [--port N] [--no-browser]";
   line.summary =
       "A page in the browser of this computer to write, look at and rehearse a protocol: its\n"
       "faults while you type, its stimuli at true scale beside the stylus, the order of each\n"
@@ -65,7 +67,10 @@ int design_command(const std::vector<std::string>& args) {
        "of 127.0.0.1; 0: one that is free")                        //
       ("no-browser", po::bool_switch(), "only print the address")  //
       ("protocol", po::value<std::string>()->value_name("PROTOCOL.json"),
-       "the file; default: the next free study.json here");
+       "the file; default: the next free study.json here")  //
+      ("db", po::value<std::vector<std::string>>()->composing()->value_name("FILE"),
+       "a database that may hold data of the study, besides those beside the protocol: the page\n"
+       "warns before its protocol becomes another one; can be given several times");
   line.positional.add("protocol", 1);
   const auto values = line.parse(args);
   if (!values) return 0;
@@ -75,13 +80,17 @@ int design_command(const std::vector<std::string>& args) {
   std::string path = text_of(*values, "protocol");
   if (path.empty()) path = design::free_name("study.json");
   const design::ProtocolFile file(path);
+  std::vector<std::string> databases;
+  if (values->count("db")) databases = (*values)["db"].as<std::vector<std::string>>();
+  for (const std::string& one : databases)
+    data::Store::open(one, data::Store::Mode::read_only);  // refuses what is none
   if (::nice(10) < 0) {
     // Only politeness towards a session on this computer is lost.
   }
   const design::TemporaryFolder folder;
   const std::string token = serve::make_token();
   serve::PageServer server(static_cast<std::uint16_t>(port), token, design::kMostMessage);
-  design::DesignPage page(file, folder);
+  design::DesignPage page(file, folder, databases);
   const std::string address = "http://127.0.0.1:" + std::to_string(server.port()) + "/#" + token;
   std::cout << address << std::endl;
   if (!std::cout) throw std::runtime_error("standard output could not be written");
@@ -89,7 +98,8 @@ int design_command(const std::vector<std::string>& args) {
   if (!(*values)["no-browser"].as<bool>() && has_display()) open_browser(address, folder);
   server.run({.get = [&page](const std::string& target) { return page.get(target); },
               .post = [&page](const std::string& target,
-                              const std::string& body) { return page.post(target, body); }});
+                              const std::string& body) { return page.post(target, body); },
+              .is_slow = design::DesignPage::is_slow});
   return 0;
 }
 

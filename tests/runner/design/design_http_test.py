@@ -6,6 +6,7 @@ Usage: design_http_test.py PALPATE PROTOCOLS
 import base64
 import hashlib
 import json
+import math
 import os
 import pathlib
 import re
@@ -185,6 +186,117 @@ class Answers(DesignCase):
             self.assertLess(max(map(max, one["triangles"])), len(one["corners"]))
 
 
+    def test_fields_textures_and_what_is_seen_are_in_the_picture(self):
+        self.design(self.copy("grating-roughness.json"))
+        shown = {one["name"]: one for one in self.ask("picture", text=(self.dir / "p.json").read_text())["stimuli"]}
+        text = json.loads((self.dir / "p.json").read_text())
+        ridged = next(one for one in text["stimuli"] if "texture" in one)
+        period = ridged["texture"]["period_m"]
+        marks = shown[ridged["name"]]["marks"]
+        self.assertEqual((marks["every"], marks["dots"]), (1, []))
+        # On the top face neighbouring crests are a period apart, and one goes through the origin.
+        top = max(corner[2] for corner in shown[ridged["name"]]["corners"])
+        places = sorted({round(end[0], 6) for line in marks["lines"] for end in line if abs(end[2] - top) < 1e-6})
+        steps = [b - a for a, b in zip(places, places[1:])]
+        self.assertGreater(len(steps), 10)
+        for step in steps[1:-1]:
+            self.assertAlmostEqual(step, period, delta=2e-6)
+        self.assertLess(min(abs(place) for place in places), 2e-6)
+        round_one = {**ridged, "name": "round", "shape": "cylinder", "radius_m": 0.02, "height_m": 0.05}
+        round_one.pop("size_m", None)
+        cones = {**ridged, "name": "cones", "texture": {"kind": "cones", "period_m": 0.004, "depth_m": 0.0004}}
+        round_one["texture"] = {"kind": "sine", "period_m": 0.004, "depth_m": 0.0004, "direction": "around"}
+        free = {"name": "free", "shape": "none", "fields": [
+            {"kind": "channel", "from_m": [0, 0, 0], "to_m": [0.05, 0, 0], "half_width_m": 0.002, "stiffness_n_per_m": 100},
+            {"kind": "constant", "force_n": [0, 0, 1]}]}
+        view = {"screen_m": [[-0.26, 0.25, -0.16], [0.26, 0.25, -0.16], [-0.26, 0.25, 0.16]], "eye_m": [0, -0.4, 0.1]}
+        large = {"name": "large", "shape": "sphere", "radius_m": 0.02, "seen": {"what": "object", "size_ratio": 1.5}}
+        same = {"name": "same", "shape": "sphere", "radius_m": 0.02, "seen": {"what": "object"}}
+        made = {"version": 2, "name": "made", "renderers": ["point"], "orientation": "fixed", "view": view,
+                "stimuli": [round_one, cones, free, large, same],
+                "blocks": [{"name": "a", "task": "rate", "question": "How?", "stimuli": ["round"], "scale": [{"label": "a"}, {"label": "b"}], "repetitions": 1}]}
+        shown = {one["name"]: one for one in self.ask("picture", text=json.dumps(made))["stimuli"]}
+        ridges = round(2 * math.pi * 0.02 / 0.004)
+        side = [line for line in shown["round"]["marks"]["lines"] if abs(math.hypot(*line[0][:2]) - 0.02) < 1e-4 and abs(line[0][2] - line[1][2]) > 1e-3]
+        turns = {round(math.atan2(line[0][1], line[0][0]) * ridges / (2 * math.pi)) % ridges for line in side}
+        self.assertEqual(len(turns), ridges)
+        self.assertEqual(shown["cones"]["marks"]["lines"], [])
+        self.assertGreater(len(shown["cones"]["marks"]["dots"]), 300)
+        self.assertEqual([one["kind"] for one in shown["free"]["fields"]], ["channel", "constant"])
+        self.assertEqual(shown["free"]["corners"], [])
+        self.assertAlmostEqual(shown["large"]["seen"]["size_m"][0], 0.06, delta=0.001)
+        self.assertNotIn("seen", shown["same"])
+
+    def test_shapes_are_built_once_and_files_are_read_again(self):
+        path = self.copy("size-questplus.json")
+        self.design(path)
+        text = path.read_text()
+
+        def seconds(changed):
+            began = time.monotonic()
+            self.assertEqual(self.ask("check", text=changed)["faults"], [])
+            return time.monotonic() - began
+        first = seconds(text)  # 16 balls of 5,120 triangles with their search trees
+        self.assertLess(min(seconds(text.replace('"title": "', f'"title": "{i} ')) for i in range(3)), 0.5 * first)
+        values = json.loads(text)
+        for one in values["stimuli"]:
+            one.update(shape="mesh", file="part.stl")
+            one.pop("radius_m")
+        values["blocks"] = [{"name": "a", "task": "identify", "stimuli": ["standard", "comparison"], "repetitions": 1}]
+        part = self.dir / "part.stl"
+        part.write_bytes(cube_stl(0.05))
+        self.assertEqual(self.ask("check", text=json.dumps(values))["faults"], [])
+        part.write_bytes(cube_stl(0.05).replace(b"endsolid", b"facet", 1))
+        self.assertNotEqual(self.ask("check", text=json.dumps(values))["faults"], [])
+
+    def test_recovery_is_that_of_schedule(self):
+        path = self.copy("size-questplus.json")
+        self.design(path)
+        mine = self.ask("recover", text=path.read_text(), block="size", participants=50)
+        theirs = json.loads(subprocess.run([PALPATE, "schedule", path, "--recover", "50", "--format", "json"], capture_output=True, text=True,
+                                           check=True, timeout=PATIENCE).stdout)
+        self.assertEqual(mine["procedures"], theirs["procedures"])
+        for block, words in (("practice", "do not follow the answers"), ("none", "do not follow the answers")):
+            self.assertIn(words, self.ask("recover", 409, text=path.read_text(), block=block)["error"])
+        self.assertIn("participants", self.ask("recover", 409, text=path.read_text(), block="size", participants=0)["error"])
+
+
+class Data(DesignCase):
+    """What the page says of data that the protocol's name has already."""
+
+    def simulated(self, path, db, *options):
+        subprocess.run([PALPATE, "simulate", path, "--db", self.dir / db, "--participants", "2", *options], check=True, capture_output=True, timeout=PATIENCE)
+
+    def test_data_beside_the_protocol_are_found(self):
+        path = self.copy("quick.json")
+        (self.dir / "other.db").write_bytes(b"no database")
+        self.simulated(path, "study.db")
+        self.design(path)
+        text = path.read_text()
+        self.assertEqual(self.ask("data", text=text)["data"], [{"database": "study.db", "participants": 2, "simulated": True, "same": True}])
+        (one,) = self.ask("data", text=text.replace('"seed": 1', '"seed": 2'))["data"]
+        self.assertEqual((one["same"], one["only_texts"]), (False, False))
+        self.assertIn("/seed", one["differs"])
+        (one,) = self.ask("data", text=text.replace('"title": "', '"title": "New: '))["data"]
+        self.assertTrue(one["only_texts"])
+        (one,) = self.ask("data", text=text + "\n")["data"]
+        self.assertEqual(one["differs"], "layout alone")
+        self.assertEqual(self.ask("data", text=text.replace('"name": "quick"', '"name": "slow"'))["data"], [])
+        before = sorted(one.name for one in self.dir.iterdir())
+        self.ask("data", text=text)
+        self.assertEqual(sorted(one.name for one in self.dir.iterdir()), before)  # looking leaves nothing
+
+    def test_a_database_elsewhere_is_named(self):
+        path = self.copy("quick.json")
+        (self.dir / "far").mkdir()
+        self.simulated(path, "far/lab.db")
+        self.design(path, "--db", "far/lab.db")
+        self.assertEqual([one["database"] for one in self.ask("data", text=path.read_text())["data"]], ["lab.db"])
+        said = subprocess.run([PALPATE, "design", path, "--no-browser", "--db", self.dir / "none.db"], capture_output=True, text=True, timeout=PATIENCE)
+        self.assertEqual(said.returncode, 2, said.stderr)
+        self.assertIn("none.db", said.stderr)
+
+
 class Files(DesignCase):
     def test_saving_keeps_bytes_and_permissions(self):
         path = self.copy("ho2000.json")
@@ -312,6 +424,37 @@ class Beside(DesignCase):
         self.assertEqual(self.ask("check", text=json.dumps(text))["faults"], [])
         picture = self.ask("picture", text=json.dumps(text))["stimuli"][0]
         self.assertAlmostEqual(picture["size_m"][0], 0.05, places=6)
+
+    def test_long_meshes_come_in_parts(self):
+        path = self.copy("quick.json")
+        self.design(path)
+        content = cube_stl(0.05) + b" " * (13 << 20)
+        key = self.ask("upload")["upload"]
+        for at in range(0, len(content), 8 << 20):
+            sent = self.ask("part", upload=key, bytes=base64.b64encode(content[at:at + (8 << 20)]).decode())["bytes"]
+        self.assertEqual(sent, len(content))
+        self.assertEqual(self.ask("mesh", name="long.stl", upload=key)["file"], "long.stl")
+        self.assertEqual((self.dir / "long.stl").read_bytes(), content)
+        self.assertEqual(list(self.temporary.rglob("*.part")), [])
+        for wrong in (key, "", "../p"):
+            self.assertIn("upload", self.ask("mesh", 409, name="x.stl", upload=wrong)["error"])
+            self.assertIn("upload", self.ask("part", 409, upload=wrong, bytes="")["error"])
+        keys = [self.ask("upload")["upload"] for _ in range(3)]  # few at a time: the room is bounded
+        self.assertEqual(sum(self.request("POST", "/part", json.dumps({"upload": one, "bytes": ""}), X_Palpate_Token=self.token)[0] == 200
+                             for one in keys), 2)
+
+    def test_solids_of_tetrahedra_are_soft(self):
+        path = self.copy("quick.json")
+        self.design(path)
+        content = (pathlib.Path(__file__).resolve().parents[2] / "protocols" / "good" / "tetrahedra.msh").read_bytes()
+        said = self.mesh("organ.msh", content)
+        self.assertEqual(said["file"], "organ.msh")
+        text = json.loads(path.read_text())
+        text["stimuli"] = [{"name": "organ", "shape": "mesh", "file": "organ.msh", "soft": said["soft"], "scale": said["scale"]}]
+        text["response"]["keys"] = {"1": "organ"}
+        found = self.ask("check", text=json.dumps(text))["faults"]
+        self.assertEqual([one for one in found if "organ.msh" in one["text"] or "soft" in one["pointer"]], [], found)
+        self.assertTrue(self.mesh("bad.msh", b"$MeshFormat\n9 0 8\n", 409)["error"])
 
     def test_no_path_of_a_mesh_leads_elsewhere(self):
         self.design(self.copy("quick.json"))
