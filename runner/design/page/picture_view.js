@@ -1,12 +1,15 @@
 // The stimuli at one scale beside the stylus. Dragging or the arrow keys turn each about its own centre.
 
 import {by_id, element} from './dom.js';
+import {extent_of, put_dot, put_field, put_rod} from './solids.js';
 import {label_of, value_in_words} from './units.js';
 
 const {add, sub, times, size, surface_of, axes_of, painter, kLight, kDark} = palpate_drawing;
 const kGap = 0.14;    // of the largest stimulus
 const kFoot = 34;     // px below a row, for names
 const kHead = 26;     // px above all, for the scale
+const kFieldAlone = 0.03, kOutOf = 1.4;  // m, of a field without a place; of the surface that it has
+const kGhost = 0.45;  // opacity of what is seen and not felt
 const kLeastLabel = 34;  // px of a cell that has room for a name
 const dark = matchMedia('(prefers-color-scheme: dark)');
 
@@ -30,6 +33,28 @@ export function stimulus_in_words(stimulus) {
     if (value !== undefined) words.push(`${label_of(key)} ${value_in_words(key, value)}`);
   }
   return words;
+}
+
+/** What is drawn of a stimulus about its centre: surfaces of one colour each. */
+function parts_of({corners = [], triangles = [], marks, fields = []}, colour, opacity) {
+  const ends = pick => [0, 1, 2].map(k => corners.reduce((v, p) => pick(v, p[k]), corners[0]?.[k] ?? 0));
+  const centre = times(0.5, add(ends(Math.min), ends(Math.max)));
+  const own = corners.map(p => sub(p, centre)), reach = own.reduce((r, p) => Math.max(r, size(p)), 0);
+  const out = fields.some(field => extent_of(field) === 0) ? kOutOf : 1;
+  const radius = Math.max(out * reach, ...fields.map(extent_of), reach === 0 && fields.length ? kFieldAlone : 0);
+  const parts = own.length ? [{mesh: surface_of(own, triangles), colour, opacity}] : [];
+  const put = (colour_of, fill) => {
+    const out = [];
+    fill(out);
+    for (let i = 0; i < out.length; i += 6) [0, 1, 2].forEach(k => out[i + k] -= centre[k]);
+    if (out.length) parts.push({mesh: {vertices: new Float32Array(out)}, colour: colour_of});
+  };
+  put('virtual', out => {
+    marks?.lines.forEach(([a, b]) => put_rod(out, a, b, 0.006 * reach));
+    marks?.dots.forEach(at => put_dot(out, at, 0.015 * reach));
+  });
+  put('force', out => fields.forEach(field => put_field(out, field, radius)));
+  return {parts, radius};
 }
 
 const in_mm = metres => metres.map(m => +(1000 * m).toPrecision(3)).join(' × ') + ' mm';
@@ -71,22 +96,20 @@ export class PictureView {
     const known = new Map(protocol_stimuli.map(one => [one?.name, stimulus_in_words(one ?? {})]));
     const base = name => name.replace(/\[.*/, '');
     const stimuli = drawn.filter(one => known.has(base(one.name)));  // channels of a reach have no place of their own
-    this.shapes = stimuli.filter(one => one.corners.length > 0).map(one => {
-      const ends = pick => [0, 1, 2].map(k => one.corners.reduce((v, p) => pick(v, p[k]), one.corners[0][k]));
-      const low = ends(Math.min), centre = times(0.5, add(low, ends(Math.max)));
-      const corners = one.corners.map(p => sub(p, centre));
-      return {name: one.name, size: one.size_m, mesh: surface_of(corners, one.triangles), radius: corners.reduce((r, p) => Math.max(r, size(p)), 0)};
-    });
+    this.shapes = stimuli.flatMap(one => [{name: one.name, size: one.size_m, ...parts_of(one)},
+      ...(one.seen ? [{name: `${one.name}, as seen`, label: 'as seen', size: one.seen.size_m, ...parts_of(one.seen, 'ideal', kGhost)}] : [])]).filter(one => one.parts.length > 0);
     this.stylus = stylus;
     this.root.querySelector('.sizes').replaceChildren(...stimuli.map(one => {
       const words = [one.size_m ? in_mm(one.size_m) : 'no surface', ...(known.get(base(one.name)) ?? [])];
+      if (one.seen) words.push(`seen as ${in_mm(one.seen.size_m)}`);
+      if (one.marks?.every > 1) words.push(`every ${one.marks.every}th ridge is drawn`);
       if (one.all_triangles) words.push(`drawn with ${one.triangles.length} of its ${one.all_triangles} triangles`);
       return element('li', {}, element('b', {text: one.name}), ` ${words.join('; ')}`);
     }));
     const note = this.root.querySelector('.note');
     note.hidden = Boolean(this.paint);
     note.textContent = 'This browser has no WebGL: sizes in words.';
-    this.canvas.setAttribute('aria-label', `Stimuli at true scale beside the stylus: ${this.shapes.map(one => `${one.name} ${in_mm(one.size)}`).join(', ')}. Drag, or the arrow keys, to turn them.`);
+    this.canvas.setAttribute('aria-label', `Stimuli at true scale beside the stylus: ${this.shapes.map(one => (one.size ? `${one.name} ${in_mm(one.size)}` : one.name)).join(', ')}. Drag, or the arrow keys, to turn them.`);
     this.draw();
   }
 
@@ -120,16 +143,17 @@ export class PictureView {
     this.shapes.forEach((shape, i) => {
       const row = Math.floor(i / columns), in_row = Math.min(columns, this.shapes.length - row * columns);
       const o = [-w / 2 + cell * (0.5 + (i % columns) + (columns - in_row) / 2), 0, ((rows - 1) / 2 - row) * row_height + kFoot / scale / 2 - down];
-      objects.push({mesh: shape.mesh, object: {...turned, o}});
+      shape.parts.forEach(part => objects.push({...part, object: {...turned, o}}));
       const [x, y] = to_px([o[0], 0, o[2] - shape.radius]);
       if (cell * scale < kLeastLabel) return;
-      labels.push(element('span', {text: shape.name}));
+      labels.push(element('span', {text: shape.label ?? shape.name}));
       labels.at(-1).style.maxWidth = `${cell * scale}px`;
       place(labels.at(-1), x, Math.min(y + 2, height - 18));
     });
     const foot = [w / 2 - 0.3 * cell, 0, -long / 2 + kFoot / scale / 2 - down];
     const at = z => add(foot, [0, 0, z]);
     const segments = this.stylus.segments?.map(([a, b]) => [add(foot, a), add(foot, b)]) ?? [[at(0), at(long)]];
+    objects.sort((a, b) => (b.opacity ?? 1) - (a.opacity ?? 1));  // what shines through is drawn last
     this.paint({objects, mesh: null, virtual: [], ideal: segments, contact: null, force: [0, 0, 0]});
     const [x, y] = to_px(foot);
     const reach = this.stylus.reach && this.stylus.reach !== 1 ? `, ×${this.stylus.reach}` : '';
