@@ -15,9 +15,12 @@ export function split_text(disk) {
 
 export class Document {
   #listeners = [];
+  #saved_listeners = [];
   #past = [];
   #future = [];
   #last = {kind: '', time: 0};
+  #names = [];  // renamings from the opened text to this one: [[kind, from, to], ...]
+  #saved_names = [];
 
   constructor(opened) {
     this.name = opened.name;
@@ -30,12 +33,29 @@ export class Document {
     Object.assign(this, {bom, crlf, mixed, sha256, exists, text: body, saved: exists ? body : null});
     this.#past = [];
     this.#future = [];
+    this.#names = this.#saved_names = [];
     this.#tell();
+  }
+
+  /** The renamings that lead from the saved text to this one, an undone one backwards. */
+  get renamings() {
+    return this.#renamings_to(this.#names);
+  }
+  #renamings_to(now) {
+    const saved = this.#saved_names;
+    let same = 0;
+    while (same < Math.min(now.length, saved.length) && now[same] === saved[same]) ++same;
+    const back = saved.slice(same).reverse().map(([kind, from, to]) => [kind, to, from]);
+    return [...back, ...now.slice(same)];
   }
 
   /** Calls back with this document after every change of its text or state. */
   listen(listener) {
     this.#listeners.push(listener);
+  }
+  /** Calls back with the renamings of a saved text, at once. */
+  listen_saved(listener) {
+    this.#saved_listeners.push(listener);
   }
   #tell() {
     this.#listeners.forEach(listener => listener(this));
@@ -49,16 +69,17 @@ export class Document {
     return this.saved === this.text;
   }
 
-  /** Replaces the text. `kind`: edits of one kind in quick succession are one step of undo, '' never is. */
-  edit(text, kind = '') {
+  /** Replaces the text. `kind`: edits of one kind in quick succession are one step of undo, '' never is. `renaming`: it is one. */
+  edit(text, kind = '', renaming = null) {
     if (text === this.text) return;
     const now = Date.now();
     const joins = kind !== '' && kind === this.#last.kind && now - this.#last.time < kTypingPause && this.#past.length > 0;
     this.#last = {kind, time: now};
-    if (!joins) this.#past.push(this.text);
+    if (!joins) this.#past.push({text: this.text, names: this.#names});
     if (this.#past.length > kMostSteps) this.#past.shift();
     this.#future = [];
     this.text = text;
+    if (renaming) this.#names = [...this.#names, renaming];
     this.#tell();
   }
 
@@ -76,15 +97,24 @@ export class Document {
   }
   #step(from, to) {
     if (from.length === 0) return;
-    to.push(this.text);
-    this.text = from.pop();
+    to.push({text: this.text, names: this.#names});
+    const {text, names} = from.pop();
+    this.text = text;
+    this.#names = names;
     this.#last = {kind: '', time: 0};
     this.#tell();
   }
 
-  /** It is on the disk with this checksum. `text`: what was written; it may have changed since. */
-  was_saved(text, sha256) {
+  /** What stands now in the renamings, for was_saved(). */
+  get names() {
+    return this.#names;
+  }
+  /** It is on the disk with this checksum. `text`: what was written, with its `names`; it may have changed since. */
+  was_saved(text, sha256, names = this.#names) {
+    const renamings = this.#renamings_to(names);
     this.saved = text;
+    this.#saved_names = names;
+    if (renamings.length) this.#saved_listeners.forEach(listener => listener(renamings));
     this.sha256 = sha256;
     this.exists = true;
     this.mixed = false;

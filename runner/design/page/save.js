@@ -2,6 +2,7 @@
 
 import {by_id, element} from './dom.js';
 import {Refused, ask} from './server.js';
+import {carry} from './renamings.js';
 import {split_text} from './document.js';
 
 const kMostLines = 4000;
@@ -67,10 +68,10 @@ async function resolve_conflict(document, error) {
 }
 
 async function save_as(document, sha256) {
-  const {text, disk} = document;
+  const {text, disk, names, renamings} = document;
   const answer = await ask('save', {text: disk, sha256});
-  document.was_saved(text, answer.sha256);
-  return '';
+  document.was_saved(text, answer.sha256, names);
+  return carry(renamings);
 }
 
 async function save_copy(document) {

@@ -3,6 +3,7 @@
 import {Refused, ask} from './server.js';
 import {choose} from './save.js';
 import {element} from './dom.js';
+import {renamed_key} from './renamings.js';
 
 const kPause = 300;  // ms after the last edit
 
@@ -21,6 +22,9 @@ export class TranslationView {
     this.root = element('div', {class: 'card'}, element('h3', {text: 'Translations'}),
         element('p', {class: 'soft', text: 'Answers are stored in the protocol\u2019s own words, whatever the participant reads.'}),
         element('div', {class: 'bar'}, element('label', {}, 'Language', this.code), this.known, this.keep, this.words), this.table);
+    document.listen_saved(renamings => {  // what was typed here keeps its place
+      this.translated = new Map([...this.translated].map(([key, value]) => [renamings.reduce(renamed_key, key), value]));
+    });
     addEventListener('beforeunload', event => {
       if (this.is_changed) event.preventDefault();
     });
@@ -74,6 +78,13 @@ export class TranslationView {
       return element('div', {class: 'pair'}, element('span', {class: 'key', text: key}), element('p', {text: original}), area, element('span', {class: 'fault', hidden: true}));
     }));
     return this.#count();
+  }
+
+  /** The file has other keys now. */
+  async renamed(renamings) {
+    if (this.language === '' || renamings.length === 0) return;
+    this.sha256 = (await ask('translation', {language: this.language})).sha256;
+    await this.show();
   }
 
   get as_text() {
