@@ -17,7 +17,7 @@ export class CheckLoop {
   #timer = 0;
   #asking = false;
 
-  /** \param told  {checked(check, values), pictured(picture, values), failed(why)} */
+  /** \param told  {checked(check, values), pictured(picture, values), known(data, values), failed(why)} */
   constructor(document, told) {
     this.document = document;
     this.told = told;
@@ -48,6 +48,7 @@ export class CheckLoop {
         this.told.checked(check, values);
         // A picture needs a protocol that can be read; else the last one stays.
         if (check.summary) this.told.pictured(await ask('picture', {text: disk}), values);
+        if (check.summary && text === this.document.text) this.told.known((await ask('data', {text: disk})).data, values);
       }
     } catch (error) {
       if (text === this.document.text) this.told.failed(error.message);

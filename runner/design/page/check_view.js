@@ -74,6 +74,20 @@ export function show_check(check, values, go_to) {
       ...[...check.devices].sort((a, b) => able(a) - able(b)).map(device_item));
 }
 
+/** "study.db holds 3 participants of this protocol as it was." */
+function data_in_words({database, participants, simulated, same, differs, only_texts}, name) {
+  const people = `${participants} ${simulated ? 'simulated ' : ''}${participants === 1 ? 'participant' : 'participants'}`;
+  if (same) return `${database} holds ${people} of this protocol as it is now: a change of it makes another study.`;
+  const then = only_texts ? 'Only texts differ: palpate run shows the new ones to those who have begun with --changed-protocol texts.' :
+    'This is another study now: give it another name. Those who have begun go on with the protocol that is stored with their data.';
+  return `${database} holds ${people} of the protocol ${name} as it was before (now other: ${differs}). ${then}`;
+}
+
+/** Shows what data the protocol's name has already. */
+export function show_data(data, values) {
+  by_id('data').replaceChildren(...data.map(one => element('li', {class: one.same ? 'soft' : 'warning', text: data_in_words(one, values?.name)})));
+}
+
 /** Shows that a text was not checked. */
 export function show_failure(why) {
   by_id('verdict').textContent = `Not checked: ${why}`;

@@ -4,8 +4,8 @@ import {element} from './dom.js';
 import {id_of, node_at, parse, pointer_of_path, replaced, with_exchanged, with_item, without_item} from './json_text.js';
 import {decide, set_member, written} from './decisions.js';
 import {label_of, shown_number, unit_of, written_number} from './units.js';
-import {named_at, names_of} from './references.js';
-import {type_of} from './schema.js';
+import {named_at, names_of, settable} from './references.js';
+import {patch_schema, set_schema, type_of} from './schema.js';
 
 const kLongTexts = new Set(['description', 'instructions', 'text', 'question', 'practice', 'break', 'end']);
 const kTypes = {boolean: 'yes or no', number: 'a number', string: 'a word', array: 'a list', object: 'in detail', null: 'none'};
@@ -197,6 +197,46 @@ function map_control(context, path, open) {
   }})));
 }
 
+/** A row for each entry, and a choice that adds one. `entry(key)`: the control of its key; `added(key)`: its JSON. */
+function rows_control(context, path, {entry, inner, choices, label, added}) {
+  const keys = Object.keys(context.value(path)), free = choices.filter(one => !keys.includes(one));
+  const put = key => context.rebuild(set_member(context.text, path, key, added(key)), [...path, key]);
+  const choice = element('select', {class: 'more', 'aria-label': label, 'data-pointer': `${pointer_of_path(path)}#add`, onchange: () => choice.selectedIndex > 0 && put(free[choice.selectedIndex - 1])},
+      element('option', {text: `${label} \u2026`}), ...free.map(text => element('option', {text})));
+  return element('div', {class: 'list', ...known(path)}, ...keys.map(key => element('div', {class: 'entry'}, entry(key), inner(key),
+      element('span', {class: 'tools'}, element('button', {type: 'button', 'aria-label': `Remove ${key}`, text: '\u00d7', 'data-pointer': `${pointer_of_path(path)}#remove${key}`,
+        onclick: () => context.rebuild(set_member(context.text, path, key, ''), null)})))), free.length ? choice : null);
+}
+
+/** What a level of a factor sets: a pointer, which is chosen or typed, and a value as what it points to has it. */
+function set_control(context, path) {
+  const {form} = context, all = settable(context.values), list = element('datalist', {id: id_of('settable', pointer_of_path(path))}, ...all.map(value => element('option', {value})));
+  const schema = key => set_schema(form.schema, context.values, key) ?? form.schema.of({});
+  const now = key => {
+    const [, kind, name, ...rest] = key.split('/');
+    const stimuli = context.values.stimuli ?? [], own = kind === 'stimuli' ? (name === '*' ? stimuli : stimuli.filter(one => one?.name === name)) : [];
+    const found = own.map(one => rest.reduce((value, step) => value?.[step], {...context.values.material, ...one})).find(one => one !== undefined);
+    return written(found ?? schema(key).initial(key.split('/').at(-1)));
+  };
+  const entry = key => element('input', {type: 'text', class: 'key', value: key, list: list.id, spellcheck: 'false', 'aria-label': `Pointer ${key}`, 'data-pointer': `${pointer_of_path([...path, key])}#key`,
+    onchange: event => {
+      const to = event.target.value.trim(), member = node_at(parse(context.text), path).members.find(one => one.key === key);
+      if (to !== '' && to !== key && !(to in context.value(path))) context.rebuild(replaced(context.text, {start: member.start, end: member.start + JSON.stringify(key).length}, JSON.stringify(to)), [...path, to]);
+    }});
+  const rows = rows_control(context, path, {entry, inner: key => value_control(context, [...path, key], schema(key)), choices: all, label: 'Set a value', added: now});
+  rows.append(list);
+  return rows;
+}
+
+/** What differs for each group: members of the protocol. */
+function patch_control(context, path) {
+  const {names = []} = context.value(['groups']) ?? {}, schema = patch_schema(context.form.schema);
+  return rows_control(context, path, {
+    entry: key => element('span', {class: 'key', text: key}), choices: names.map(String), label: 'Let a group differ', added: () => '{}',
+    inner: key => (type_of(context.value([...path, key])) === 'object' ? context.form.members(context, [...path, key], schema) : json_control(context, [...path, key])),
+  });
+}
+
 /** "Given as": another type of value, where there are several. */
 function type_control(context, path, schema, branch) {
   const types = new Map(schema.branches().map(one => [one.value_type(), one]));
@@ -214,7 +254,9 @@ function type_control(context, path, schema, branch) {
 function plain_control(context, path, schema, branch) {
   const key = path.at(-1), value = context.value(path), type = type_of(value), wanted = branch.value_type();
   const kind = named_at(path);
-  if (path.length >= 3 && key === 'name' && ['stimuli', 'blocks', 'factors'].includes(path[0]) && path.length === 3) return name_control(context, path);
+  if (key === 'name' && ['stimuli', 'blocks', 'factors', 'pages'].includes(path[0]) && path.length === 3) return name_control(context, path);
+  if (key === 'set' && path[0] === 'factors' && type === 'object') return set_control(context, path);
+  if (key === 'patch' && path[0] === 'groups' && path.length === 2 && type === 'object') return patch_control(context, path);
   if (type === 'string' && kind) return select_control(context, path, names_of(context.values, kind), key, one => context.replace(path, JSON.stringify(one)));
   if (type === 'string' && key === 'path' && path.at(-2) === 'level') {
     const {levels} = context.form.naming(path.slice(0, -2));

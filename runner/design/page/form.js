@@ -1,11 +1,12 @@
 // The form of a part of the protocol, made from the schema: members that are there as fields, the others in a menu.
 
 import {Context, title_of, value_control} from './controls.js';
-import {NotJson, has_duplicates, id_of, parse, pointer_of_path} from './json_text.js';
+import {NotJson, has_duplicates, id_of, node_at, parse, pointer_of_path} from './json_text.js';
 import {element, by_id} from './dom.js';
 import {levels_of, names_of, renamed} from './references.js';
-import {schema_at} from './schema.js';
-import {hint_in_words} from './units.js';
+import {is_patch, schema_at} from './schema.js';
+import {hint_in_words, unit_of} from './units.js';
+import {Recoveries} from './recover_view.js';
 import {set_member, settle, written} from './decisions.js';
 
 const kFirst = ['name', 'title', 'description', 'shape', 'task', 'kind', 'file', 'radius_m', 'height_m', 'edge_m', 'size_m', 'scale', 'stimuli', 'standard', 'level', 'procedure'];
@@ -17,6 +18,7 @@ export class Form {
     this.schema_of = schema_of;
     this.faults = [];
     this.quiet = false;
+    this.recoveries = new Recoveries();
     this.read();
   }
 
@@ -60,7 +62,13 @@ export class Form {
   rename(path, to) {
     const from = path.reduce((value, step) => value[step], this.values);
     if (to === from) return;
-    this.rebuild(renamed(this.document.text, path, to), undefined);
+    this.focus = undefined;
+    this.document.edit(renamed(this.document.text, path, to), '', [path[0], from, to]);
+  }
+
+  /** The unit of what a block varies; '': none. */
+  unit_of_level(path) {
+    return unit_of(this.unit_key(path, 'levels')).unit === 'mm' ? 'm' : unit_of(this.unit_key(path, 'levels')).unit;
   }
 
   /** Names and numbers that new members of the object at a path may refer to. */
@@ -76,6 +84,7 @@ export class Form {
 
   /** The key that says a number's unit: levels have that of the number that varies. */
   unit_key(path, key) {
+    if (key.startsWith('/')) return key.split('/').findLast(step => !/^\d+$/.test(step));
     const block = path[0] === 'blocks' ? this.values.blocks?.[path[1]] : undefined;
     const varied = block?.level?.path?.split('/').findLast(step => !/^\d+$/.test(step));
     const of_level = ['levels', 'start', 'starts', 'min', 'max', 'steps', 'step', 'turn', 'low', 'high'];
@@ -112,6 +121,7 @@ export class Form {
       'data-pointer': `${pointer}#remove`, text: '\u00d7', onclick: () => this.rebuild(set_member(this.document.text, path, key, ''), null)});
     const words = belongs ? hint_in_words(key, known.resolved().json.description ?? '') : 'This key is unknown here.';
     const hint = words ? element('span', {class: belongs ? 'hint' : 'hint alarm', id: id_of('hint', pointer), text: words}) : null;
+    if (key === 'procedure' && path[0] === 'blocks' && path.length === 2) control.append?.(this.recoveries.place(context, at));
     if (hint) control.querySelector?.('input, select, textarea')?.setAttribute('aria-describedby', hint.id);
     return element('div', {class: inner ? 'row wide' : 'row', 'data-row': pointer}, label, control, remove, hint, element('span', {class: 'fault', id: id_of('fault', pointer), hidden: true}));
   }
@@ -136,8 +146,14 @@ export class Form {
   }
 
   #set(path, key, schema) {
-    const naming = this.naming(path), draft = set_member(this.document.text, path, key, written(schema.initial(key)));
+    const naming = this.naming(path), draft = set_member(this.document.text, path, key, this.#initial(path, key, schema));
     this.rebuild(settle(draft, this.schema_of, path, new Set(), naming), [...path, key]);
+  }
+
+  /** JSON to begin a member with: in a group's patch what the protocol says, which a list replaces as a whole. */
+  #initial(path, key, schema) {
+    const same = is_patch(path) ? node_at(this.root, [...path.slice(3), key]) : undefined;
+    return same && same.kind !== 'object' ? this.document.text.slice(same.start, same.end) : written(is_patch(path) && same ? {} : schema.initial(key));
   }
 
   /** A context of the text as it is now. */

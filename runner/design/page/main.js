@@ -14,7 +14,7 @@ import {by_id, element} from './dom.js';
 import {choose_template} from './start_view.js';
 import {load_schemas} from './schema.js';
 import {save} from './save.js';
-import {show_check, show_failure} from './check_view.js';
+import {show_check, show_data, show_failure} from './check_view.js';
 
 function banner(words) {
   by_id('banner').textContent = words;
@@ -36,6 +36,7 @@ class Page {
     this.checks = new CheckLoop(this.document, {
       checked: (check, values) => this.#checked(check, values),
       failed: why => show_failure(why),
+      known: (data, values) => show_data(data, values),
       pictured: (picture, values) => this.picture.show(picture, Array.isArray(values?.stimuli) ? values.stimuli : []),
     });
     this.#listen();
@@ -125,7 +126,9 @@ class Page {
     // What is typed in a field may not have been taken yet.
     if (by_id('view').contains(focused) && focused.matches('input[type="text"], textarea')) focused.dispatchEvent(new Event('change'));
     try {
+      const {renamings} = this.document;
       const words = this.document.is_saved ? '' : await save(this.document, this.checks.faults);
+      if (this.document.is_saved) await this.views.get('translations').view.renamed(renamings);
       if (words) by_id('saved').textContent = words;
     } catch (error) {
       by_id('saved').textContent = `Not saved: ${error.message}`;

@@ -85,6 +85,17 @@ export function levels_of(stimulus) {
   return out.length > 40 ? out.slice(0, 40) : out;
 }
 
+/** What a level of a factor may set: pointers to values of stimuli, of all or of one, and to keys of blocks. */
+export function settable(values) {
+  const out = new Set(), stimuli = Array.isArray(values.stimuli) ? values.stimuli : [];
+  const numbers = stimuli.map(one => (one === null || typeof one !== 'object' ? [] : levels_of({...values.material, ...one})));
+  const all = numbers.flat();
+  all.filter((one, i) => all.indexOf(one) === i).forEach(pointer => out.add(`/stimuli/*${pointer}`));
+  stimuli.forEach((one, i) => numbers[i].forEach(pointer => out.add(`/stimuli/${one.name}${pointer}`)));
+  for (const key of ['repetitions', 'feedback', 'question', 'instructions', 'time_out_s', 'interval_limit_s', 'inter_interval_s']) out.add(`/block/${key}`);
+  return [...out];
+}
+
 /** A name that is not taken: "ball-2". */
 export function free_name(names, wanted) {
   const stem = wanted.replace(/-\d+$/, '');

@@ -14,6 +14,11 @@ class Schema {
     return new Schema(this.set, this.file, json);
   }
 
+  /** The same for a part of such a value: nothing is needed, at any depth. */
+  as_part() {
+    return Object.assign(this.of(this.json), {is_part: true});
+  }
+
   /** Without a reference: what it refers to, and beside it what stands here. */
   resolved() {
     if (typeof this.json?.$ref !== 'string') return this;
@@ -81,7 +86,8 @@ class Schema {
   members(value) {
     const out = {properties: new Map(), required: new Set(), open: null, keys: null, choices: [], description: ''};
     const branches = this.branches().filter(one => one.value_type() === 'object');
-    if (branches.length > 1) this.branch_of(value ?? {}).#collect(value, out);
+    const other = branches.length === 1 && this.branches().length > 1;  // beside a text or a number
+    if (branches.length > 1 || other) (other ? branches[0] : this.branch_of(value ?? {})).#collect(value, out);
     else this.#collect(value, out);
     // A member that a branch fixes is one of all branches' choices.
     const consts = new Map();
@@ -90,6 +96,11 @@ class Schema {
         if (inner && 'const' in inner) consts.set(key, [...(consts.get(key) ?? []), inner.const]);
     for (const [key, all] of consts)
       if (all.length > 1 && out.properties.has(key)) out.properties.set(key, this.of({description: '', enum: all}));
+    if (this.is_part) {
+      out.required.clear();
+      out.choices = [];
+      for (const [key, inner] of out.properties) out.properties.set(key, inner.as_part());
+    }
     return out;
   }
 
@@ -175,9 +186,41 @@ export async function load_schemas() {
   };
 }
 
+const kNotPatched = ['groups', 'factors', 'tests', 'name', 'version', 'seed', 'cues', '$schema'];
+
+/** Whether a path is of what differs for a group, or within it. */
+export const is_patch = path => path[0] === 'groups' && path[1] === 'patch' && path.length >= 3;
+
+/** The schema of what a group may differ in: parts of the protocol. */
+export function patch_schema(root) {
+  const part = root.as_part(), members = part.members.bind(part);
+  part.members = value => {
+    const out = members(value);
+    kNotPatched.forEach(key => out.properties.delete(key));
+    return out;
+  };
+  return part;
+}
+
+/** The schema of what a level of a factor sets; null: the pointer leads nowhere. */
+export function set_schema(root, values, pointer) {
+  const [, kind, ...steps] = pointer.split('/').map(step => step.replace(/~1/g, '/').replace(/~0/g, '~'));
+  const has = path => path.reduce((value, step) => value?.[step], values) !== undefined;
+  const rest = (kind === 'stimuli' ? steps.slice(1) : steps).map(step => (/^\d+$/.test(step) ? Number(step) : step));
+  const at = (list, wanted) => Math.max(0, (values[list] ?? []).findIndex(wanted));
+  const head = kind === 'stimuli' ? ['stimuli', at('stimuli', (one, i) => (steps[0] === '*' ? has(['stimuli', i, ...rest]) : one?.name === steps[0]))] : ['blocks', at('blocks', one => one?.factors)];
+  return rest.length ? schema_at(root, values, [...head, ...rest]) : null;
+}
+
 /** The schema of the value at a path. */
 export function schema_at(root, values, path) {
+  const set = path[0] === 'factors' ? path.indexOf('set') : -1;
+  if (set > 0 && path.length > set + 1) {
+    const own = set_schema(root, values, path[set + 1]);
+    if (own) return path.length === set + 2 ? own : schema_at(own, path.slice(0, set + 2).reduce((value, step) => value?.[step], values), path.slice(set + 2));
+  }
   let schema = root, value = values;
+  if (is_patch(path)) return schema_at(patch_schema(root), values.groups?.patch?.[path[2]], path.slice(3));
   for (const step of path) {
     const branch = schema.branch_of(value);
     if (type_of(value) === 'array') schema = branch.of(branch.json.items ?? {});

@@ -4,12 +4,14 @@ Usage: design_browser_test.py PALPATE PROTOCOLS
 """
 
 import json
+import subprocess
 import sys
 import time
 import unittest
 
 sys.dont_write_bytecode = True
 from browser_case import PROTOCOLS, BrowserCase, skip_without_browser  # noqa: E402
+from design_case import PALPATE, PATIENCE  # noqa: E402
 from design_http_test import PROTOCOL_FILES  # noqa: E402
 
 
@@ -315,6 +317,62 @@ class Views(BrowserCase):
           return [most * canvas.clientWidth / canvas.width, parseFloat(bar.textContent), bar.getBoundingClientRect().width];
         })()""")
         self.assertAlmostEqual(wide[0] / wide[2] * wide[1], 60, delta=2)
+
+    def drawn(self, colour):
+        """How many pixels of the picture have about a colour, by its hue."""
+        return self.js(f"""(() => {{
+          design.picture.draw();
+          const canvas = design.picture.canvas, copy = document.createElement('canvas');
+          copy.width = canvas.width, copy.height = canvas.height;
+          const context = copy.getContext('2d');
+          context.drawImage(canvas, 0, 0);
+          const {{data}} = context.getImageData(0, 0, copy.width, copy.height), is = {colour};
+          let n = 0;
+          for (let i = 0; i < data.length; i += 4) n += is(data[i], data[i + 1], data[i + 2]) ? 1 : 0;
+          return n;
+        }})()""")
+
+    def test_fields_textures_and_what_is_seen_are_drawn(self):
+        orange, grey = "(r, g, b) => r > 100 && r > 1.6 * g && g > 1.5 * b", "(r, g, b) => Math.abs(r - g) < 22 && Math.abs(g - b) < 22 && r < 140"
+        self.page(self.copy("force-field.json"))
+        self.assertEqual(self.js("design.picture.shapes.map(one => one.name)"), ["curl"])  # a field of 0 is nothing
+        self.assertGreater(self.drawn(orange), 100)
+        path = self.copy("grating-roughness.json", "q.json")
+        self.page(path)
+        ridged = self.drawn(grey)
+        self.assertEqual(self.drawn(orange), 0)
+        values = json.loads(path.read_text())
+        for one in values["stimuli"]:
+            one.pop("texture", None)
+        lines = self.js("design.picture.shapes.reduce((n, one) => n + one.parts.length, 0)")
+        self.js("design.picture.shapes.forEach(one => one.parts.length = 1)")
+        self.assertGreater(ridged, self.drawn(grey) + 300)
+        self.assertGreater(lines, self.js("design.picture.shapes.length"))
+        self.page(self.copy("visual-haptic-size.json", "v.json"))
+        names = self.js("design.picture.shapes.map(one => one.name)")
+        for one in json.loads((self.dir / "v.json").read_text())["stimuli"]:
+            seen = one.get("seen", {})
+            other = seen and "object" in str(seen.get("what")) and (seen.get("size_ratio", 1) != 1 or "shape" in seen or one.get("felt") is False)
+            self.assertEqual(f"{one['name']}, as seen" in names, bool(other), one)
+        self.assertEqual(self.complaints(), [])
+
+    def test_the_page_warns_of_another_study(self):
+        path = self.copy("quick.json")
+        subprocess.run([PALPATE, "simulate", path, "--db", self.dir / "study.db", "--participants", "2"], check=True, capture_output=True, timeout=PATIENCE)
+        self.page(path)
+        self.wait_for("document.querySelectorAll('#data li').length === 1")
+        self.assertEqual(self.js("document.querySelector('#data li').className"), "soft")
+        self.assertIn("study.db holds 2 simulated participants of this protocol as it is now", self.js("document.querySelector('#data').textContent"))
+        self.set_text(self.text().replace('"seed": 1', '"seed": 9'))
+        self.wait_for("document.querySelector('#data .warning') !== null")
+        words = self.js("document.querySelector('#data').textContent")
+        for part in ("2 simulated participants", "quick", "/seed", "another study now", "give it another name"):
+            self.assertIn(part, words)
+        self.set_text(self.text().replace('"seed": 9', '"seed": 1').replace('"title": "', '"title": "New: '))
+        self.wait_for("document.querySelector('#data').textContent.includes('--changed-protocol texts')")
+        self.set_text(self.text().replace('"name": "quick"', '"name": "other"'))
+        self.wait_for("document.querySelectorAll('#data li').length === 0")
+        self.assertEqual(self.complaints(), [])
 
     def test_nothing_overlaps_at_any_size(self):
         self.page(self.copy("ho2000.json"))

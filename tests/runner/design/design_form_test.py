@@ -6,6 +6,7 @@ Usage: design_form_test.py PALPATE PROTOCOLS
 import difflib
 import json
 import pathlib
+import re
 import shutil
 import subprocess
 import sys
@@ -284,6 +285,128 @@ class Edits(FormCase):
                 self.assertEqual(back, text)
                 process.kill()
 
+    def test_a_new_name_reaches_the_translations(self):
+        path = self.copy("roughness-magnitude.json")
+        values = json.loads(path.read_text())
+        ball, die = ({**values["stimuli"][0], "name": name} for name in ("ball", "die"))
+        values["stimuli"] += [ball, die]
+        values["blocks"].append({"name": "which", "task": "identify", "question": "Which was it?", "stimuli": ["ball", "die"], "repetitions": 2,
+                                 "keys": {"1": {"answer": "ball", "label": "Ball"}, "2": {"answer": "die", "label": "Die"}}})
+        path.write_text(json.dumps(values, indent=2))
+        self.page(path)
+        texts = {key: f"{i} \u00fc" for i, (key, _) in enumerate(self.ask("texts", text=path.read_text())["texts"])}
+        german = self.dir / "p.texts.de.json"
+        german.write_text("{" + ",\n".join(f"{json.dumps(key)}  :  {json.dumps(value, ensure_ascii=False)}" for key, value in texts.items()) + "}", encoding="utf-8")
+        before = german.read_text(encoding="utf-8")
+        (self.dir / "p.texts.fr.json").write_text("{ half")
+        block, die = values["blocks"][0]["name"], next(i for i, one in enumerate(values["stimuli"]) if one["name"] == "die")
+        self.show("blocks", 0)
+        self.enter("/blocks/0/name", "first-one")
+        self.show("stimuli", die)
+        self.enter(f"/stimuli/{die}/name", "dice")
+        self.assertEqual(german.read_text(encoding="utf-8"), before)  # not before it is saved
+        self.key("s", "Control")
+        self.wait_for("document.getElementById('saved').textContent.includes('translations')")
+        self.assertEqual(self.js("document.getElementById('saved').textContent"),
+                         "Renamed in the translations too: de. Not renamed in: fr (it is not JSON).")
+        wanted = {re.sub(rf"^blocks\.{block}\.", "blocks.first-one.", key).replace("blocks.which.keys.die", "blocks.which.keys.dice"): value
+                  for key, value in texts.items()}
+        self.assertEqual(json.loads(german.read_text(encoding="utf-8")), wanted)
+        self.assertNotEqual(list(wanted), list(texts))
+        self.assertEqual(self.ask("check_translation", text=path.read_text(), language="de", translation=german.read_text(encoding="utf-8"))["faults"], [])
+        self.js("document.activeElement.blur(), design.document.undo(), design.document.undo()")
+        self.key("s", "Control")
+        self.wait_for("design.document.is_saved && document.getElementById('saved').textContent.includes('translations')")
+        self.assertEqual(german.read_text(encoding="utf-8"), before)  # to the byte
+
+    def test_a_typed_translation_survives_a_new_name(self):
+        path = self.copy("roughness-magnitude.json")
+        block = json.loads(path.read_text())["blocks"][0]["name"]
+        (self.dir / "p.texts.de.json").write_text("{}")
+        self.page(path)
+        self.show("translations")
+        self.wait_for("document.querySelectorAll('.pair').length > 3")
+        area = f"[...document.querySelectorAll('.pair textarea')].find(a => a.dataset.key === 'blocks.{block}.question')"
+        self.js(f"{area}.focus()")
+        self.type("Wie rauh?")
+        self.show("blocks", 0)
+        self.enter("/blocks/0/name", "new")
+        self.key("s", "Control")
+        self.wait_for("design.document.is_saved")
+        self.show("translations")
+        self.wait_for("document.querySelector('.pair textarea') && [...document.querySelectorAll('.pair textarea')].some(a => a.dataset.key === 'blocks.new.question')")
+        self.assertEqual(self.js("[...document.querySelectorAll('.pair textarea')].find(a => a.dataset.key === 'blocks.new.question').value"), "Wie rauh?")
+
+    def test_what_a_level_of_a_factor_sets_is_chosen(self):
+        path = self.copy("stiffness-surface-size.json")
+        self.page(path)
+        values = json.loads(self.text())
+        self.show("groups")
+        self.assertEqual(self.js("document.querySelectorAll('main textarea.json').length"), 0)
+        level = "/factors/0/levels/1/set"
+        (pointer, old), *_ = values["factors"][0]["levels"][1]["set"].items()
+        token = pointer.replace("/", "~1")
+        self.assertEqual(self.js(f"{self.control(f'{level}/{token}#key')}.value"), pointer)
+        self.enter(f"{level}/{token}", "0.25" if old != 0.25 else "0.3")
+        self.assertEqual(json.loads(self.text())["factors"][0]["levels"][1]["set"][pointer], 0.25 if old != 0.25 else 0.3)
+        self.js("document.activeElement.blur(), design.document.undo()")
+        self.settle()
+        self.choose(f"{level}#add", "/stimuli/*/stiffness_n_per_m")
+        added = json.loads(self.text())["factors"][0]["levels"][1]["set"]
+        self.assertEqual(added["/stimuli/*/stiffness_n_per_m"], next(one for one in values["stimuli"]).get(
+            "stiffness_n_per_m", values.get("material", {}).get("stiffness_n_per_m")))
+        row = self.js(f"{self.control(level + '/~1stimuli~1*~1stiffness_n_per_m')}.closest('.entry').textContent")
+        self.assertIn("N/m", row)
+        self.enter(f"{level}/~1stimuli~1*~1stiffness_n_per_m#key", "/stimuli/*/damping_ns_per_m")
+        self.assertIn("/stimuli/*/damping_ns_per_m", json.loads(self.text())["factors"][0]["levels"][1]["set"])
+        self.press(f"{level}#remove/stimuli/*/damping_ns_per_m")
+        self.assertEqual(json.loads(self.text()), values)
+
+    def test_what_differs_for_a_group_has_fields(self):
+        path = self.copy("stiffness-two-groups.json")
+        values = json.loads(path.read_text())
+        values["groups"].pop("patch", None)
+        path.write_text(json.dumps(values, indent=2))
+        self.page(path)
+        self.show("groups")
+        name = values["groups"]["names"][1]
+        self.choose("/groups#more", "Patch")
+        self.choose("/groups/patch#add", name)
+        self.choose(f"/groups/patch/{name}#more", "Breaks")
+        self.assertEqual(json.loads(self.text())["groups"]["patch"], {name: {"breaks": {}}})
+        self.choose(f"/groups/patch/{name}/breaks#more", "Min seconds") if self.js(
+            f"[...{self.control(f'/groups/patch/{name}/breaks#more')}.options].some(o => o.text.startsWith('Min seconds'))") else self.choose(
+                f"/groups/patch/{name}/breaks#more", "Min")
+        self.enter(f"/groups/patch/{name}/breaks/min_seconds", "45")
+        self.choose(f"/groups/patch/{name}#more", "Stimuli")
+        patch = json.loads(self.text())["groups"]["patch"][name]
+        self.assertEqual(patch["breaks"], {"min_seconds": 45})
+        self.assertEqual(patch["stimuli"], values["stimuli"])  # a list is replaced as a whole: it begins as it is
+        self.enter(f"/groups/patch/{name}/stimuli/0/stiffness_n_per_m", "350")
+        self.checked()
+        self.assertEqual(json.loads(self.text())["groups"]["patch"][name]["stimuli"][0]["stiffness_n_per_m"], 350)
+        self.assertEqual(self.js("document.getElementById('verdict').className"), "good")
+        self.assertNotIn("Seed", self.js(f"[...{self.control(f'/groups/patch/{name}#more')}.options].map(o => o.text.split(':')[0])"))
+
+    def test_the_bias_of_a_procedure(self):
+        self.page(self.copy("size-questplus.json"))
+        self.show("blocks", 1)
+        self.js(f"(c => c.value = '60')({self.control('/blocks/1/procedure#people')})")
+        self.press("/blocks/1/procedure#recover")
+        self.wait_for("document.querySelectorAll('main .recover td').length > 0")
+        cells = self.js("[...document.querySelectorAll('main .recover td')].map(e => e.textContent)")
+        found = self.ask("recover", text=self.text(), block="size", participants=60)["procedures"][0]
+        self.assertEqual(cells[:3], [f"{found['true_threshold']:.4g}", f"{found['bias']:.4g}".replace("e-0", "e-"), f"{found['bias_se']:.4g}".replace("e-0", "e-")])
+        self.show("stimuli", 0)
+        self.show("blocks", 1)
+        self.assertGreater(self.js("document.querySelectorAll('main .recover td').length"), 0)  # it stays while the block does
+        self.enter("/blocks/1/procedure/stop/trials", "40")
+        self.show("blocks", 1)
+        self.assertEqual(self.js("document.querySelectorAll('main .recover td').length"), 0)
+        self.show("blocks", 0)
+        self.press("/blocks/0/procedure#recover")
+        self.wait_for("document.querySelector('main .recover [role=status]').textContent.includes('do not follow the answers')")
+
     def test_entries_are_added_copied_moved_removed(self):
         self.page(self.copy("ho2000.json"))
         before = self.text()
@@ -432,6 +555,19 @@ class Beside(FormCase):
         self.settle()
         self.js("design.document.undo()") if self.text() != before else None
         self.assertEqual(self.text(), before)
+
+    def test_long_meshes_and_solids_become_stimuli(self):
+        self.page(self.copy("quick.json"))
+        self.show("stimuli", 0)
+        content = cube_stl(0.04).decode()
+        self.js(f"design.views.get('stimuli').view.mesh.take(new File([{json.dumps(content)}, ' '.repeat(12 << 20)], 'long.stl')), 0")
+        self.wait_for("design.document.text.includes('long.stl')")
+        self.assertEqual((self.dir / "long.stl").stat().st_size, len(content) + (12 << 20))
+        solid = (TESTS / "protocols" / "good" / "tetrahedra.msh").read_text()
+        self.js(f"design.views.get('stimuli').view.mesh.take(new File([{json.dumps(solid)}], 'organ.msh')), 0")
+        self.wait_for("design.document.text.includes('organ.msh')")
+        self.assertEqual(json.loads(self.text())["stimuli"][-1]["soft"], {"young_pa": 20000})
+        self.assertEqual(self.complaints(), [])
 
     def test_a_bad_mesh_says_why(self):
         self.page(self.copy("ho2000.json"))
