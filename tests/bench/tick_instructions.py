@@ -89,13 +89,17 @@ SCENES = {
     "two": {"objects": [ball(), beside(1)]},
     "compound": {"objects": [{"shape": "compound", "parts": [ball(), beside(1)]}]},
     "surface": {"objects": [{"shape": "mesh", "file": "ball.obj"}]},
+    "sine": {"objects": [ball(texture={"kind": "sine", "period_m": 0.002, "depth_m": 0.0002})]},
+    "noise": {"objects": [ball(texture={"kind": "noise", "period_m": 0.002, "depth_m": 0.0002})]},
+    "curl": {"objects": [ball(fields=[{"kind": "curl", "axis": [0, 0, 1], "damping_ns_per_m": 2, "destabilising": True}])]},
 }
 # feature, renderer with it, scene with it, renderer without it, scene without it
 ROWS = [("side contact, torque", "ray", "plain", "point", "plain")]
 for probe in ("point", "ray"):
     ROWS += [("several objects", probe, "two", probe, "plain"), ("unions and tools", probe, "compound", probe, "two"),
              ("closed surfaces", probe, "surface", probe, "plain"), ("damping", probe, "damping", probe, "plain"),
-             ("friction", probe, "friction", probe, "plain")]
+             ("friction", probe, "friction", probe, "plain"), ("texture by a formula", probe, "sine", probe, "plain"),
+             ("texture by a table", probe, "noise", probe, "plain"), ("field", probe, "curl", probe, "plain")]
 
 
 def ptrace(request, pid, address=0, data=0):
