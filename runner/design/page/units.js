@@ -2,7 +2,7 @@
 
 // The longest first: stiffness_n_per_m is no length.
 const kUnits = [
-  ['_n_per_m', 'N/m'], ['_ns_per_m', 'N s/m'], ['_m_per_s2', 'm/s²'], ['_m_per_s', 'm/s'], ['_kg_per_m3', 'kg/m³'],
+  ['_per_m_per_s', 's/m'], ['_n_per_m', 'N/m'], ['_ns_per_m', 'N s/m'], ['_m_per_s2', 'm/s²'], ['_m_per_s', 'm/s'], ['_kg_per_m3', 'kg/m³'],
   ['_rad_per_s', 'rad/s'], ['_per_s', '1/s'], ['_m', 'mm', 3], ['_n', 'N'], ['_s', 's'], ['_hz', 'Hz'], ['_deg', '°'],
   ['_db', 'dB'], ['_kg', 'kg'], ['_pa', 'Pa'], ['_bits', 'bit'], ['_minutes', 'min'], ['_seconds', 's'],
 ];

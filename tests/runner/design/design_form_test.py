@@ -26,13 +26,13 @@ UNITS = {
     "amplitude_ns_per_m": "N s/m", "give_stiffness_n_per_m": "N/m", "clamp_stiffness_n_per_m": "N/m", "force_n": "N", "break_n": "N",
     "amplitude_n": "N", "time_out_s": "s", "decay_s": "s", "damping_s": "s", "min_seconds": "s", "max_minutes": "min", "rate_hz": "Hz",
     "noise_hz": "Hz", "frequency_hz": "Hz", "level_db": "dB", "mass_kg": "kg", "density_kg_per_m3": "kg/m³", "young_pa": "Pa",
-    "phase_deg": "°", "blur_deg": "°", "turn_deg": "°", "entropy_bits": "bit", "damping_per_s": "1/s", "gravity_m_per_s2": "m/s²",
+    "phase_deg": "°", "blur_deg": "°", "turn_deg": "°", "entropy_bits": "bit", "damping_per_s": "1/s", "decay_per_s": "1/s", "gain_per_m_per_s": "s/m", "gravity_m_per_s2": "m/s²",
     "velocity_m_per_s": "m/s", "spin_rad_per_s": "rad/s",
 }
 PLAIN = {"axis", "background", "blocks_per_renderer", "block", "catch_share", "catch_trials", "clamp_share", "count", "criterion", "direction",
-         "discard_reversals", "down", "every_trials", "exponent", "factor", "friction", "friction_dynamic", "friction_static", "guess", "high",
+         "discard_reversals", "down", "every_trials", "exponent", "factor", "friction", "friction_dynamic", "friction_static", "gain", "guess", "high",
          "intervals", "jitter", "jitter_steps", "lapse", "levels", "light", "limit", "low", "max", "max_rounds", "max_run", "min",
-         "min_distance", "modulus", "number", "of", "orientation", "orientation_wxyz", "poisson", "repetitions", "resolution", "restitution",
+         "min_distance", "modulus", "number", "of", "orientation", "orientation_wxyz", "pan", "poisson", "repetitions", "resolution", "restitution", "scrape",
          "reversals", "scale", "seed", "segments", "series", "session", "size_ratio", "slope", "start", "starts", "step", "step_ratio", "steps",
          "codes", "correct", "fixed", "pivot", "subdivisions", "target", "threshold", "tool_gain", "trials", "turn", "up", "values", "version", "warm_up_trials", "weights"}
 
