@@ -18,7 +18,7 @@ version="$("$root/usr/bin/palpate" --version)"
   fail "runner/install/debian/changelog does not begin with $version"
 
 # A package without a Falcon, windows or noise would install and disappoint: what was missing when it was built?
-for library in libasound2 libglfw3 libpango-1.0-0 libsqlite3-0 libusb-1.0-0; do
+for library in libasound2 libglfw3 libpango-1.0-0 libsamplerate0 libsndfile1 libsqlite3-0 libusb-1.0-0; do
   dpkg-deb -f "$package" Depends | grep -q "\b$library\b" || fail "it does not depend on $library"
 done
 for file in /etc/security/limits.d/palpate.conf /usr/lib/udev/rules.d/60-palpate.rules /usr/share/man/man1/palpate-run.1.gz \
