@@ -785,10 +785,13 @@ StudyCheck check_study(const Registration& registered, const std::string& folder
       "Sessions were run without the protocol's masking noise.",
       noted(study,
             [](const std::string& note) { return note == R"({"masking_noise":"left out"})"; })));
+  const bool sounds = registered.protocol.sounds ||
+                      std::ranges::any_of(registered.protocol.stimuli, [](const auto& stimulus) {
+                        return stimulus.sound.has_value();
+                      });
   out.points.push_back(left_out(
       "sounds", "Sounds",
-      registered.protocol.sounds ? "No session records that they were left out."
-                                 : "The protocol has no sounds.",
+      sounds ? "No session records that they were left out." : "The protocol has no sounds.",
       "Sessions were run without the protocol's sounds.",
       noted(study, [](const std::string& note) { return note == R"({"sounds":"left out"})"; })));
   out.points.push_back(of_torque(registered, study));

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "analysis/text.h"
+#include "data/base/cell_name.h"
 #include "data/base/markdown.h"
 #include "data/base/text.h"
 #include "data/files/utc.h"
@@ -123,6 +124,23 @@ class Questions {
         text("The participant's window shows the protocol's texts and the keys of the answers; it "
              "names neither the renderer nor the object that is shown. The experimenter's console "
              "shows both.")};
+    const auto named = [&](const auto& is_one) {
+      std::string names;
+      for (const protocols::StimulusSpec& stimulus : protocol_.stimuli) {
+        if (is_one(stimulus) && stimulus.name == base_name(stimulus.name))
+          names += (names.empty() ? "" : ", ") + stimulus.name;
+      }
+      return names;
+    };
+    const std::string seen =
+        named([](const auto& stimulus) { return stimulus.seen && stimulus.seen->anything(); });
+    if (!seen.empty())
+      question.answer.push_back(
+          text("It draws what the protocol says is seen of these stimuli: " + seen + "."));
+    const std::string heard =
+        named([](const auto& stimulus) { return stimulus.sound.has_value(); });
+    if (!heard.empty())
+      question.answer.push_back(text("Contacts with these are heard: " + heard + "."));
     if (std::string words = study_->feedback(); !words.empty())
       question.answer.push_back(text(std::move(words)));
     return question;

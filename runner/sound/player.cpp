@@ -15,7 +15,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr SoundBuffer kQuick{64, 2}, kPatient{128, 4};
+constexpr SoundBuffer kQuick{64, 2}, kPatient{128, 4}, kUnhurried{256, 8};
 // Pacing for outputs without a clock (a file), which accept everything at once: write a block every
 // 0.9 of its duration. A sound card is slower and sets the pace itself.
 constexpr double kPace = 0.9;
@@ -53,7 +53,8 @@ void SoundPlayer::start() {
   thread_ = std::jthread([this, &opened] {
     try {
       const bool quick = settings_.realtime && settings_.realtime();
-      output_ = settings_.open(settings_.device, quick ? kQuick : kPatient);
+      const SoundBuffer& without = settings_.ticks != nullptr ? kPatient : kUnhurried;
+      output_ = settings_.open(settings_.device, quick ? kQuick : without);
       const SoundBuffer held = output_->buffer();
       rate_ = output_->rate();
       latency_ = held.block * held.blocks / rate_ + kWaking;

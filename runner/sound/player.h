@@ -46,9 +46,9 @@ struct SoundSettings {
 /// Plays in its own thread; session and servo never wait for it. Plays silence while off, so that a
 /// sound card does not click. Use it from one thread.
 ///
-/// With real-time scheduling the output holds two blocks of 64 frames, without it four of 128,
-/// which a busy computer does not miss; a card that refuses takes what it can. Whatever is asked
-/// for is heard latency() later, to the sample.
+/// With real-time scheduling the output holds two blocks of 64 frames. Without it a busy computer
+/// would leave gaps: four of 128, and eight of 256 where no contact is to be heard. A card that
+/// refuses takes what it can. Whatever is asked for is heard latency() later, to the sample.
 class SoundPlayer {
  public:
   /// Opens the output and plays silence. \throws SoundError
