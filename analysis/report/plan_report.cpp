@@ -145,7 +145,9 @@ void add_curve(Panel& panel, const Plan& plan, const PlanCurve& curve, Role role
 }
 
 std::string conclusion_of(const ThresholdPlan& plan, std::size_t trials) {
-  const std::string with = counted(trials, "trial", "trials") + " with each condition: ";
+  const bool of_conditions = plan.study.contrast == PlannedContrast::conditions;
+  const std::string with = counted(trials, "trial", "trials") +
+                           (of_conditions ? " with each condition: " : " that give it: ");
   for (const ThresholdPower& one : plan.powers) {
     if (one.trials == trials && one.power >= plan.settings.power)
       return with + std::to_string(one.participants) + " participants reach a power of " +
