@@ -77,6 +77,7 @@ void add_meridians(const stimuli::ObjectSpec& object, const stimuli::Texture& te
 void add_dots(const stimuli::Texture& texture, const std::vector<Corners>& triangles,
               SurfaceMarks& out) {
   std::vector<double> areas;
+  areas.reserve(triangles.size());
   double all = 0;
   for (const Corners& one : triangles)
     areas.push_back(all += glm::length(glm::cross(one[1] - one[0], one[2] - one[0])));

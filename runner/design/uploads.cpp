@@ -13,7 +13,7 @@ namespace palpate::runner::design {
 std::string Uploads::begin() {
   constexpr std::size_t kAtATime = 2;
   while (bytes_.size() >= kAtATime) remove(bytes_.begin()->first);
-  const std::string key = serve::make_token();
+  std::string key = serve::make_token();
   bytes_[key] = 0;
   return key;
 }
