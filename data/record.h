@@ -70,12 +70,12 @@ struct FrameRecord {
 /// When what was seen of a trial was on the screen, by the clock of the program: a screen and a
 /// compositor add to it. After the intended delay.
 struct SeenRecord {
-  int frames = 0;      ///< drawn
-  int dropped = 0;     ///< missing between them, by their median distance
-  double lag = 0;      ///< s, median from the tick whose pose is drawn to the swap
-  double lag_p99 = 0;  ///< s, likewise
-  std::int64_t first_ns = 0;           ///< session clock, swap of the first; 0: an older version's
-  std::string frames_sha256 = {};      ///< of TrialRecord::frames; "": they are not kept
+  int frames = 0;                  ///< drawn
+  int dropped = 0;                 ///< missing between them, by their median distance
+  double lag = 0;                  ///< s, median from the tick whose pose is drawn to the swap
+  double lag_p99 = 0;              ///< s, likewise
+  std::int64_t first_ns = 0;       ///< session clock, swap of the first; 0: an older version's
+  std::string frames_sha256 = {};  ///< of TrialRecord::frames; "": they are not kept
 
   /// s; half of what people notice between sight and touch (45 ms, Vogels 2004).
   static constexpr double kMostLag = 0.0225;

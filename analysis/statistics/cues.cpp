@@ -147,8 +147,8 @@ class CausalChoice {
     Nodes out{};
     for (std::size_t i = 0; i < kNodes; ++i) {
       const double d = conflict + places_[i], z = d / apart_;
-      const double one = one_cause_ * std::exp(-0.5 * z * z) /
-                         (std::sqrt(2 * std::numbers::pi) * apart_);
+      const double one =
+          one_cause_ * std::exp(-0.5 * z * z) / (std::sqrt(2 * std::numbers::pi) * apart_);
       const double two = (1 - one_cause_) / range_;
       out[i] = -two / (one + two) * best_.weight * d;
     }
@@ -352,8 +352,8 @@ CueTest test_of(const std::vector<double>& differences) {
 }  // namespace
 
 const char* to_string(CueModel model) {
-  constexpr std::array kNames = {"optimal",     "best-cue", "equal-weights",
-                                 "free-weight", "free",     "switching", "causal"};
+  constexpr std::array kNames = {"optimal", "best-cue",  "equal-weights", "free-weight",
+                                 "free",    "switching", "causal"};
   return kNames[static_cast<std::size_t>(model)];
 }
 

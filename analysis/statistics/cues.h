@@ -79,7 +79,8 @@ struct CueParticipant {
   /// chance.
   double jnd_better = 0;
   std::vector<CuePse> points;
-  std::vector<CueModelFit> models;  ///< in the order of CueModel; without the last where it needs more
+  std::vector<CueModelFit>
+      models;  ///< in the order of CueModel; without the last where it needs more
   CueModel best = CueModel::optimal;  ///< of the least AIC
 };
 

@@ -117,10 +117,11 @@ std::vector<Column> event_columns(const ProtocolFacts& facts) {
       {"orientation_z", "Orientation of the stimulus, unit quaternion, z", "1"},
   };
   if (facts.seen)
-    all.push_back({"seen_on",
-                   "From the onset of the trial to the first frame in which something was drawn, by "
-                   "the program's clock; missing: nothing was",
-                   "s"});
+    all.push_back(
+        {"seen_on",
+         "From the onset of the trial to the first frame in which something was drawn, by "
+         "the program's clock; missing: nothing was",
+         "s"});
   if (facts.heard)
     all.push_back({"sound",
                    "From the onset of the trial to the first contact that was heard, without what "
@@ -229,8 +230,8 @@ std::string MotionEvents::table(std::int64_t first_row, const ProtocolFacts& fac
   row << std::span<const Column>(event_columns(facts));
   std::string table = row.end();
   for (const Event& event : events_) {
-    row << static_cast<double>(event.slot - first_row) / facts.servo_rate + event.since << event.duration
-        << (event.interval > 0 ? "interval" : "trial") << event.trial;
+    row << static_cast<double>(event.slot - first_row) / facts.servo_rate + event.since
+        << event.duration << (event.interval > 0 ? "interval" : "trial") << event.trial;
     if (event.interval > 0)
       row << event.interval;
     else
@@ -487,9 +488,7 @@ void BidsRecording::put_trials(nlohmann::ordered_json& sidecar) const {
   sidecar["Objects"] = objects_of(study_);
 }
 
-std::string BidsRecording::motion_events() const {
-  return events_.table(first_row_, study_.facts);
-}
+std::string BidsRecording::motion_events() const { return events_.table(first_row_, study_.facts); }
 
 std::int64_t BidsRecording::first_row_ns() const {
   return begin_ns_ + static_cast<std::int64_t>(std::llround(static_cast<double>(first_row_) * 1e9 /

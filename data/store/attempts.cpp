@@ -638,7 +638,8 @@ std::string completing_sql() {
 /// The task with the checksum of its frames.
 TaskRecord task_with_frames(const TrialRecord& record) {
   TaskRecord task = record.task;
-  if (task.seen && !record.frames.empty()) task.seen->frames_sha256 = frames_checksum(record.frames);
+  if (task.seen && !record.frames.empty())
+    task.seen->frames_sha256 = frames_checksum(record.frames);
   return task;
 }
 

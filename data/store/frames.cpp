@@ -53,8 +53,8 @@ std::vector<FrameRecord> read_frames(SQLite::Database& db, std::int64_t attempt)
       db, "SELECT swap_ns, pose_ns, delay_ns FROM frames WHERE attempt_id = ? ORDER BY frame");
   find.bind(1, attempt);
   while (find.executeStep())
-    out.push_back({find.getColumn(0).getInt64(), find.getColumn(1).getInt64(),
-                   find.getColumn(2).getInt64()});
+    out.push_back(
+        {find.getColumn(0).getInt64(), find.getColumn(1).getInt64(), find.getColumn(2).getInt64()});
   return out;
 }
 

@@ -112,9 +112,12 @@ TaskRecord parse_task_text(const std::string& text) {
     take_if(in, "confidence_ns", task.confidence_ns);
     if (in.contains("seen")) {
       const Json& seen = in.at("seen");
-      task.seen = {seen.at("frames").get<int>(), seen.at("dropped").get<int>(),
-                   seen.at("lag_s").get<double>(), seen.at("lag_p99_s").get<double>(),
-                   seen.value("first_ns", std::int64_t{0}), seen.value("frames_sha256", "")};
+      task.seen = {seen.at("frames").get<int>(),
+                   seen.at("dropped").get<int>(),
+                   seen.at("lag_s").get<double>(),
+                   seen.at("lag_p99_s").get<double>(),
+                   seen.value("first_ns", std::int64_t{0}),
+                   seen.value("frames_sha256", "")};
     }
     if (in.contains("heard")) {
       const Json& heard = in.at("heard");

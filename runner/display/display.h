@@ -120,8 +120,8 @@ struct SeenTrial;
 
 /// A frame of what is seen. Session clock.
 struct SeenFrame {
-  std::int64_t swap_ns = 0;  ///< after the driver had drawn it
-  std::int64_t pose_ns = 0;  ///< of the tick whose pose is drawn
+  std::int64_t swap_ns = 0;   ///< after the driver had drawn it
+  std::int64_t pose_ns = 0;   ///< of the tick whose pose is drawn
   std::int64_t delay_ns = 0;  ///< intended, between both
 };
 

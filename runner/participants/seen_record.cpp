@@ -12,8 +12,8 @@ std::optional<data::SeenRecord> seen_record(const std::vector<data::FrameRecord>
   constexpr double kPause = 0.25;       // s; longer: between intervals
   std::vector<double> lags, steps;
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    lags.push_back(kNanosecond * static_cast<double>(frames[i].swap_ns - frames[i].pose_ns -
-                                                     frames[i].delay_ns));
+    lags.push_back(kNanosecond *
+                   static_cast<double>(frames[i].swap_ns - frames[i].pose_ns - frames[i].delay_ns));
     const double step =
         i == 0 ? kPause
                : kNanosecond * static_cast<double>(frames[i].swap_ns - frames[i - 1].swap_ns);

@@ -87,8 +87,10 @@ export class Form {
     if (key.startsWith('/')) return key.split('/').findLast(step => !/^\d+$/.test(step));
     const block = path[0] === 'blocks' ? this.values.blocks?.[path[1]] : undefined;
     const varied = block?.level?.path?.split('/').findLast(step => !/^\d+$/.test(step));
-    const of_level = ['levels', 'start', 'starts', 'min', 'max', 'steps', 'step', 'turn', 'low', 'high'];
-    if (!varied || !of_level.includes(key) || block.task === 'rate') return key;
+    const of_level = ['levels', 'threshold', 'start', 'starts', 'min', 'max', 'steps', 'step', 'turn', 'low', 'high'];
+    // Parts of a range or of weighted values have the unit of the whole.
+    const whole = ['from', 'to', 'values'].includes(key) ? path.at(-1) : key;
+    if (!varied || !of_level.includes(whole) || block.task === 'rate') return key;
     const procedure = path.includes('procedure') ? path.slice(0, path.indexOf('procedure') + 1).concat(typeof path[path.indexOf('procedure') + 1] === 'number' ? [path[path.indexOf('procedure') + 1]] : []) : null;
     const scale = procedure?.reduce((value, step) => value?.[step], this.values)?.scale;
     const is_ratio = scale && scale !== 'linear' && ['steps', 'step'].includes(key);

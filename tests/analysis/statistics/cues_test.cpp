@@ -149,8 +149,8 @@ double causal_estimate(double felt_size, double seen_size, double one_cause, dou
   const double felt = felt_size + kHaptic * normal(random),
                seen = seen_size + kVisual * normal(random);
   const double variance = kHaptic * kHaptic + kVisual * kVisual, d = seen - felt;
-  const double one = one_cause * std::exp(-d * d / (2 * variance)) /
-                     std::sqrt(2 * std::numbers::pi * variance);
+  const double one =
+      one_cause * std::exp(-d * d / (2 * variance)) / std::sqrt(2 * std::numbers::pi * variance);
   const double two = (1 - one_cause) / range;
   const double weight = kHaptic * kHaptic / variance;
   const double both = weight * seen + (1 - weight) * felt;
@@ -180,8 +180,7 @@ CueAnswers causal_answers(double one_cause, int trials, Random& random) {
 TEST(Cues, CausalInferenceIsFoundAndItsPriorRecovered) {
   for (const double one_cause : {0.3, 0.6, 0.9}) {
     Random random(3, {static_cast<std::uint64_t>(10 * one_cause)});
-    const CueModelFit fit =
-        fit_cues(causal_answers(one_cause, 20'000, random), CueModel::causal);
+    const CueModelFit fit = fit_cues(causal_answers(one_cause, 20'000, random), CueModel::causal);
     std::printf("prior of one cause %.1f: fitted %.3f\n", one_cause, fit.weight);
     EXPECT_NEAR(fit.weight, one_cause, 0.03);
     EXPECT_NEAR(fit.haptic_sd, kHaptic, 0.002);

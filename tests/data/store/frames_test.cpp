@@ -19,7 +19,8 @@ class Frames : public ::testing::Test {
  protected:
   void add(const std::string& code, int trial, std::vector<FrameRecord> frames) {
     Store store = Store::open(path_, Store::Mode::write_or_create);
-    const data::Run run = store.begin_run(store.enrol(testing::a_protocol(), code), testing::a_run(1));
+    const data::Run run =
+        store.begin_run(store.enrol(testing::a_protocol(), code), testing::a_run(1));
     TrialRecord record = testing::a_record(trial, 1);
     record.task.task = "rate";
     record.task.block_name = "b";
@@ -66,9 +67,8 @@ TEST_F(Frames, HaveNoTableWhereNothingWasSeen) {
 }
 
 TEST_F(Frames, ThatWereChangedAreFound) {
-  for (const char* change :
-       {"UPDATE frames SET swap_ns = swap_ns - 1 WHERE frame = 2", "DELETE FROM frames WHERE frame = 3",
-        "DROP TABLE frames"}) {
+  for (const char* change : {"UPDATE frames SET swap_ns = swap_ns - 1 WHERE frame = 2",
+                             "DELETE FROM frames WHERE frame = 3", "DROP TABLE frames"}) {
     std::filesystem::remove(path_);
     add("P1", 1, kSome);
     SQLite::Database(path_, SQLite::OPEN_READWRITE).exec(change);

@@ -204,8 +204,11 @@ class Round(FormCase):
 
     def test_levels_have_the_unit_of_what_varies(self):
         self.page(self.copy("size-questplus.json"))
-        self.show("blocks", 0)
-        self.assertIn("mm", self.js("[...document.querySelectorAll('main [data-row$=levels] .unit')].map(e => e.textContent)"))
+        self.show("blocks", 1)
+        for member in ("levels", "threshold"):
+            units = self.js(f"[...document.querySelectorAll('main [data-row*=\"/{member}\"] .unit')].map(e => e.textContent)")
+            self.assertIn("mm", units, member)
+            self.assertNotIn("m", units, member)
 
 
 class Edits(FormCase):
