@@ -151,7 +151,7 @@ PUBLIC = {
                       "preflight run_record replay session session_end simulated_study "
                       "socket_advisor station",
     "runner/output": "outputs progress_line",
-    "runner/station": "admission opening protocol_check protocol_choice run_settings sound_timing",
+    "runner/station": "admission lag_check opening protocol_check protocol_choice run_settings sound_timing",
     "runner/touch": "checked_meshes forces live_touch scene_notes trial_page",
     "runner/movement": "movement_study touched_trial",
     "runner/evidence/reports": "accuracy_report boundary_report scene_report stability_report stability_study",

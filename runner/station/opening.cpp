@@ -173,29 +173,6 @@ std::unique_ptr<participants::ResponseBox> open_response_box(
   }
 }
 
-std::string check_seen_lag(data::Store& store, const protocols::Protocol& protocol) {
-  if (!protocol.view) return {};
-  std::vector<double> lags;
-  std::int64_t newest_ns = 0;
-  store.for_each_trial([&](const data::StoredTrial& trial) {
-    if (!trial.record.task.seen || trial.run.clock.utc_ns < newest_ns) return;
-    if (trial.run.clock.utc_ns > newest_ns) lags.clear();
-    newest_ns = trial.run.clock.utc_ns;
-    lags.push_back(trial.record.task.seen->lag);
-  });
-  if (lags.empty()) return {};
-  std::ranges::sort(lags);
-  const double lag = lags[lags.size() / 2];
-  if (lag <= data::SeenRecord::kMostLag) return {};
-  const std::string found = std::to_string(std::lround(1000 * lag)) + " ms";
-  if (!protocol.view->lag_accepted)
-    throw UsageError("what is seen was " + found +
-                     " late in the newest session of this database, more than 22 ms, half of what "
-                     "people notice: use a faster graphics card or a smaller window, or write "
-                     R"("lag": "accepted" into the protocol's view, which is on record)");
-  return nlohmann::ordered_json{{"seen_lag_accepted_s", lag}}.dump();
-}
-
 namespace {
 
 /// Of the newest run that has any, whoever took part in it.

@@ -66,11 +66,6 @@ std::unique_ptr<sound::SoundPlayer> open_sound(const RunSettings& settings,
                                                const protocols::Protocol& protocol,
                                                servo::HeardTicks& heard);
 
-/// What the newest run of a protocol with a view says of the lag of its frames.
-/// \return a note for the record: the lag is accepted; empty: it is short, or unknown
-/// \throws UsageError: people may notice it, and the protocol does not accept that
-std::string check_seen_lag(data::Store& store, const protocols::Protocol& protocol);
-
 /// Null if no response box is named. \param emergency  commands zero force at once; called in the
 /// box's thread. \throws UsageError; std::runtime_error: its port cannot be opened
 std::unique_ptr<participants::ResponseBox> open_response_box(

@@ -1,17 +1,12 @@
 #include "runner/station/sound_timing.h"
 
 #include <algorithm>
-#include <cmath>
-#include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
-#include <optional>
 
 #include "data/base/json_text.h"
 #include "data/files/atomic_file.h"
 #include "protocols/json_document.h"
-#include "runner/station/opening.h"
-#include "runner/usage_error.h"
 
 namespace palpate::runner::station {
 namespace {
@@ -42,29 +37,6 @@ SoundTiming read_timing(protocols::ObjectReader& one) {
   one.number("latency_p99_s", out.p99, {0, 10, "s"}, kRequired);
   one.text("made_utc", out.made_utc, kMostWord);
   return out;
-}
-
-std::optional<double> measured_lag(const RunSettings& settings) {
-  if (settings.calibration.empty()) return std::nullopt;
-  for (const SoundTiming& timing : stored_sound_timings(sound_timing_file(settings.calibration))) {
-    if (timing.device == settings.sound_device) return timing.median;
-  }
-  return std::nullopt;
-}
-
-/// s, the median of the newest run that has any.
-std::optional<double> newest_lag(data::Store& store) {
-  std::vector<double> lags;
-  std::int64_t newest_ns = 0;
-  store.for_each_trial([&](const data::StoredTrial& trial) {
-    if (!trial.record.task.heard || trial.run.clock.utc_ns < newest_ns) return;
-    if (trial.run.clock.utc_ns > newest_ns) lags.clear();
-    newest_ns = trial.run.clock.utc_ns;
-    lags.push_back(trial.record.task.heard->lag);
-  });
-  if (lags.empty()) return std::nullopt;
-  std::ranges::sort(lags);
-  return lags[lags.size() / 2];
 }
 
 }  // namespace
@@ -103,23 +75,6 @@ void store_sound_timing(const std::string& path, const SoundTiming& timing) {
   file.write(ordered_json{{"version", kVersion}, {"sounds", sounds}}.dump(2) + "\n");
   file.sync();
   file.commit(true);
-}
-
-std::string check_sound_lag(data::Store& store, const protocols::Protocol& protocol,
-                            const RunSettings& settings) {
-  if (!has_contact_sound(protocol) || settings.without_noise) return {};
-  const std::optional<double> measured = measured_lag(settings);
-  const std::optional<double> lag = measured ? measured : newest_lag(store);
-  if (!lag || *lag <= data::HeardRecord::kMostLag) return {};
-  const std::string found = std::to_string(std::lround(1000 * *lag)) + " ms";
-  const std::string where = measured ? "by the measurement beside the calibration"
-                                     : "in the newest session of this database";
-  if (!protocol.sounds || !protocol.sounds->lag_accepted)
-    throw UsageError("contacts are heard " + found + " late " + where +
-                     ", more than 12 ms, half of what people notice: allow real-time scheduling, "
-                     "name another --sound-device, or write "
-                     R"("lag": "accepted" into the protocol's sounds, which is on record)");
-  return ordered_json{{"sound_lag_accepted_s", *lag}}.dump();
 }
 
 }  // namespace palpate::runner::station

@@ -5,10 +5,6 @@
 #include <string>
 #include <vector>
 
-#include "data/store/store.h"
-#include "protocols/protocol.h"
-#include "runner/station/run_settings.h"
-
 namespace palpate::runner::station {
 
 /// From the tick of a contact to its sound at an input of the same computer.
@@ -27,11 +23,5 @@ void store_sound_timing(const std::string& path, const SoundTiming& timing);
 /// Empty where there is no such file. \throws protocols::InputError with every fault; also where a
 /// measurement was changed by hand
 std::vector<SoundTiming> stored_sound_timings(const std::string& path);
-
-/// What the record says of a lag between contact and sound that people may notice, as measured at
-/// the sound card, or else in the newest session of the database; empty: nothing.
-/// \throws UsageError: the lag is too long, and the protocol does not accept it
-std::string check_sound_lag(data::Store& store, const protocols::Protocol& protocol,
-                            const RunSettings& settings);
 
 }  // namespace palpate::runner::station

@@ -33,8 +33,8 @@
 #include "runner/session/socket_advisor.h"
 #include "runner/session/station.h"
 #include "runner/station/admission.h"
+#include "runner/station/lag_check.h"
 #include "runner/station/opening.h"
-#include "runner/station/sound_timing.h"
 
 // `palpate run`: a live session with a person and a device. Opens the station, runs the session in
 // a thread of its own beside the display's loop, and reports. The path to a force continues in

@@ -24,8 +24,8 @@
 #include "runner/session/device_check.h"
 #include "runner/session/recorded_outcome.h"
 #include "runner/station/admission.h"
+#include "runner/station/lag_check.h"
 #include "runner/station/opening.h"
-#include "runner/station/sound_timing.h"
 #include "runner/touch/forces.h"
 #include "runner/touch/trial_page.h"
 

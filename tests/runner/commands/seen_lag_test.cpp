@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "protocols/parse.h"
-#include "runner/station/opening.h"
+#include "runner/station/lag_check.h"
 #include "runner/usage_error.h"
 #include "tests/data/store/store_fixture.h"
 

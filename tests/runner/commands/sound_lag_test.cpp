@@ -7,6 +7,7 @@
 
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
+#include "runner/station/lag_check.h"
 #include "runner/station/sound_timing.h"
 #include "runner/usage_error.h"
 #include "tests/data/store/store_fixture.h"
