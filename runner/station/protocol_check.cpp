@@ -145,6 +145,17 @@ Json summary_json(const protocols::Protocol& protocol) {
   return out;
 }
 
+/// \param noise  of the protocol
+std::string masked_note(const protocols::SoundSpec& sound, const protocols::MaskingNoise& noise) {
+  constexpr double kTap = 0.2;  // m/s, of an ordinary tap
+  double loudest = sound.modes.empty() ? 1 : 0;
+  for (const protocols::SoundSpec::Mode& mode : sound.modes) loudest += mode.gain;
+  const double rms = std::min(kTap * sound.gain * loudest, sound::kLoudest) / std::sqrt(2.0);
+  if (rms > 0 && 20 * std::log10(rms) >= noise.level_db) return {};
+  return "/sound/gain_per_m_per_s: at 0.2 m/s its loudest moment is below the masking noise of " +
+         protocols::level_text(noise.level_db) + " dB";
+}
+
 }  // namespace
 
 servo::DeviceConfig device_config(const protocols::Protocol& protocol) {
@@ -175,21 +186,6 @@ std::vector<Verdict> device_verdicts(const protocols::Protocol& protocol,
   }
   return out;
 }
-
-namespace {
-
-/// \param noise  of the protocol
-std::string masked_note(const protocols::SoundSpec& sound, const protocols::MaskingNoise& noise) {
-  constexpr double kTap = 0.2;  // m/s, of an ordinary tap
-  double loudest = sound.modes.empty() ? 1 : 0;
-  for (const protocols::SoundSpec::Mode& mode : sound.modes) loudest += mode.gain;
-  const double rms = std::min(kTap * sound.gain * loudest, sound::kLoudest) / std::sqrt(2.0);
-  if (rms > 0 && 20 * std::log10(rms) >= noise.level_db) return {};
-  return "/sound/gain_per_m_per_s: at 0.2 m/s its loudest moment is below the masking noise of " +
-         protocols::level_text(noise.level_db) + " dB";
-}
-
-}  // namespace
 
 std::vector<std::string> effect_notes(const protocols::Protocol& protocol,
                                       const StimulusLibrary& library) {
