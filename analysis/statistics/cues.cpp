@@ -370,13 +370,13 @@ CueModelFit fit_cues(const CueAnswers& answers, CueModel model) {
     sum -= log_likelihood(answers.haptic, at.haptic_mu(x), felt, lapse);
     sum -= log_likelihood(answers.visual, at.visual_mu(x), seen, lapse);
     const CueOptimum both = combined(model, felt, seen, x, at.haptic.spread);
-    CausalChoice causal(felt, seen, model == CueModel::causal ? both.weight : 1, at.haptic.spread);
+    std::optional<CausalChoice> causal;
+    if (model == CueModel::causal) causal.emplace(felt, seen, both.weight, at.haptic.spread);
     for (const CueBlock& block : answers.both) {
       for (const LevelCount& count : block.counts)
-        sum -= log_binomial(
-            count, model == CueModel::causal
-                       ? shared_of(lapse, causal.chosen(block, count.level))
-                       : probability_of_both(model, block, count.level, both, felt, seen, lapse));
+        sum -= log_binomial(count, causal ? shared_of(lapse, causal->chosen(block, count.level))
+                                          : probability_of_both(model, block, count.level, both,
+                                                                felt, seen, lapse));
     }
     return sum;
   };
