@@ -94,12 +94,12 @@ void SoundPlayer::turn_off() { on_ = false; }
 
 void SoundPlayer::contacts(const protocols::SoundSpec* sound) {
   auto source = sound != nullptr ? sources_->of(*sound) : nullptr;
-  const std::lock_guard lock(contacts_);
+  const std::lock_guard lock(mutex_);
   next_source_ = std::move(source);
 }
 
 std::vector<Knock> SoundPlayer::take_knocks() {
-  const std::lock_guard lock(contacts_);
+  const std::lock_guard lock(mutex_);
   return std::exchange(knocks_, {});
 }
 
@@ -142,14 +142,14 @@ void SoundPlayer::play_blocks() {
     right = left;
     if (settings_.ticks != nullptr) {
       {
-        const std::lock_guard lock(contacts_);
+        const std::lock_guard lock(mutex_);
         if (next_source_) touched.play(*std::exchange(next_source_, std::nullopt));
       }
       servo::HeardTick tick;
       while (settings_.ticks->pop(tick)) touched.hear(tick);
       touched.add(left, right, now_ns() + std::llround(1e9 * output_->latency()));
       if (const std::optional<Knock> knock = touched.take_knock()) {
-        const std::lock_guard lock(contacts_);
+        const std::lock_guard lock(mutex_);
         knocks_.push_back(*knock);
       }
     }

@@ -103,7 +103,7 @@ class SoundPlayer {
   int underruns_before_ = 0;
   std::optional<SoundSources> sources_;
 
-  std::mutex contacts_;                                            ///< of the next two
+  std::mutex mutex_;                                               ///< of the next two
   std::optional<std::shared_ptr<const SoundSource>> next_source_;  ///< none: no change
   std::vector<Knock> knocks_;
 

@@ -190,7 +190,7 @@ double measured_power(double turn, double low_pass) {
   return work / (kTicks * kTick);
 }
 
-TEST(Fields, CurlPowerOnACircleIsInClosedForm) {
+TEST(Fields, CurlPowerIsTheClosedForm) {
   for (const double low_pass : {0.0, 0.002, 0.01}) {
     for (const double turn : {6.0, -6.0}) {
       const double expected = curl_power(15, 0.3, turn, kTick, low_pass);

@@ -174,7 +174,7 @@ protocols::Protocol protocol_of(const std::string& task, const std::string& text
       "p.json");
 }
 
-TEST(NoLeak, EveryShapeHasTheSamePixelsInEveryStateAndLanguage) {
+TEST(NoLeak, PixelsAreTheSameForEveryShape) {
   const std::vector<std::string> languages = {
       "{}",
       R"({"move_away": "Bitte zur\u00fcck zum Anfang", "go": "Los", "other_key": "Diese Taste tut jetzt nichts."})",

@@ -84,7 +84,7 @@ std::shared_ptr<const SoundSource> source(const protocols::SoundSpec& sound) {
   return SoundSources(kRate).of(sound);
 }
 
-TEST(ContactSound, IsHeardWithinASampleOfTickAndLag) {
+TEST(ContactSound, FollowsItsTickToTheSample) {
   for (int touches = 20; touches < 60; ++touches) {
     Ear ear;
     Hand hand;
@@ -165,7 +165,7 @@ TEST(ContactSound, SaysHowLateItIs) {
   EXPECT_NEAR(ear.sound.take_knock()->lag, 0.04, 1.01 / kRate);
 }
 
-TEST(ContactSound, WaitsForItsDelayAndKeepsItOutOfTheLag) {
+TEST(ContactSound, KeepsItsDelayOutOfTheLag) {
   Ear ear;
   Hand hand;
   protocols::SoundSpec late = knock({{1000, 50, 1}});

@@ -206,7 +206,7 @@ TEST_F(Players, DoNotBlockWhenTheOutputHangs) {
   ear_.held_up = false;
 }
 
-TEST(NoisePlayer, WithoutAnOutputItThrows) {
+TEST(SoundPlayer, WithoutAnOutputItThrows) {
   EXPECT_THROW(SoundPlayer(SoundSettings{.device = "no such device"}), SoundError);
 }
 
