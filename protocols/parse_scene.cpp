@@ -6,10 +6,12 @@
 #include <iterator>
 #include <memory>
 #include <optional>
+#include <stdexcept>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "data/base/input_file.h"
 #include "data/base/text.h"
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
@@ -540,7 +542,15 @@ std::shared_ptr<const std::string> read_kept_file(ObjectReader& section, const c
                                                    "; there is no " + path.string());
     return nullptr;
   }
-  return std::make_shared<const std::string>(read_text_file(path.string()));
+  constexpr std::size_t kMostBytes = std::size_t{16} << 20U;
+  try {
+    return std::make_shared<const std::string>(read_whole(path.string(), kMostBytes));
+  } catch (const std::runtime_error& error) {
+    section.faults().add(section.pointer(key), std::string("expected a ") + what +
+                                                   " of at most 16 MiB; " + path.string() + ": " +
+                                                   error.what());
+    return nullptr;
+  }
 }
 
 stimuli::ObjectSpec read_object(ObjectReader& reader, const stimuli::Material& default_material,

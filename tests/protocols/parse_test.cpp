@@ -265,6 +265,19 @@ TEST(Parse, SaysWhereAndWhat) {
   }
 }
 
+TEST(Parse, RefusesLargeRecordings) {
+  const palpate::testing::TemporaryFolder folder;
+  std::ofstream(folder / "tap.wav") << "RIFF";
+  std::ofstream(folder / "p.json") << R"({"version": 2, "name": "p", "renderers": ["point"],
+    "stimuli": [{"name": "a", "shape": "cube", "edge_m": 0.05, "sound": {"kind": "file", "file": "tap.wav"}}],
+    "blocks": [{"name": "b", "task": "rate", "stimuli": ["a"], "repetitions": 1}]})";
+  EXPECT_NO_THROW(parse_protocol(folder / "p.json"));
+  fs::resize_file(folder / "tap.wav", (std::uintmax_t{16} << 20U) + 1);
+  const std::vector<Fault> faults = faults_when([&] { parse_protocol(folder / "p.json"); });
+  ASSERT_EQ(faults.size(), 1U);
+  EXPECT_EQ(faults[0].location, "/stimuli/0/sound/file");
+}
+
 TEST(Parse, SaysThatAMeshFileIsAFolder) {
   const palpate::testing::TemporaryFolder folder;
   fs::create_directory(folder / "a.obj");
