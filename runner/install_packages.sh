@@ -11,7 +11,7 @@ package=(dpkg-dev file help2man)  # `cmake --install` and cpack
 tests=(dbus-daemon imagemagick libbenchmark-dev libbullet-dev libegl1 libfcl-dev libode-dev libgl1-mesa-dri libgtest-dev librsvg2-bin
   libumockdev-dev libxml2-utils man-db openbox python3 python3-jsonschema python3-pytest umockdev x11-utils x11-xserver-utils xdotool xfwm4
   xserver-xorg-core xserver-xorg-video-dummy xvfb zstd)
-quality=(chromium clang clang-format clang-tidy devscripts lintian munge mypy octave python3-matplotlib rt-tests slurm-wlm valgrind)
+quality=(chromium clang clang-format clang-tidy devscripts firefox-esr iproute2 lintian munge mypy octave python3-matplotlib rt-tests slurm-wlm valgrind)
 command -v npm > /dev/null || quality+=(npm)  # it comes with other people's nodejs, too
 
 case "${1:-}" in

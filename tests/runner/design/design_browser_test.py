@@ -1,6 +1,6 @@
 """The page of palpate design as text: faults, order, rehearsal, saving, what may go wrong.
 
-Usage: design_browser_test.py PALPATE PROTOCOLS
+Usage: design_browser_test.py PALPATE PROTOCOLS [chromium|firefox]
 """
 
 import json
@@ -201,8 +201,7 @@ class Saving(BrowserCase):
 
     def test_loading_again_shows_the_page(self):
         self.page(self.copy("quick.json"))
-        self.browser.events.clear()
-        self.browser.call("Page.reload")
+        self.browser.reload()
         self.wait_for("window.design !== undefined && document.readyState === 'complete'")
         self.checked()
 
@@ -282,12 +281,8 @@ class Views(BrowserCase):
             self.assertEqual(nameless, [], view)
 
     def test_sizes_in_words_without_webgl(self):
-        self.browser.call("Page.enable")
-        script = self.browser.call("Page.addScriptToEvaluateOnNewDocument", source="HTMLCanvasElement.prototype.getContext = () => null")
-        try:
+        with self.browser.without_webgl():
             self.page(self.copy("quick.json"))
-        finally:
-            self.browser.call("Page.removeScriptToEvaluateOnNewDocument", identifier=script["identifier"])
         self.assertEqual(self.complaints(), [])
         self.assertTrue(self.js("document.querySelector('.stage').hidden"))
         self.assertIn("no WebGL", self.js("document.querySelector('#picture .note').textContent"))

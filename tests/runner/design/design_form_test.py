@@ -1,6 +1,6 @@
 """The form of palpate design: each value has a control, each edit changes what it means to and nothing else.
 
-Usage: design_form_test.py PALPATE PROTOCOLS
+Usage: design_form_test.py PALPATE PROTOCOLS [chromium|firefox]
 """
 
 import difflib
@@ -156,6 +156,7 @@ class Round(FormCase):
         self.assertEqual(self.focused(), "Name")
 
     def test_numbers_are_moved_and_not_calculated(self):
+        self.needs_modules()
         self.page(self.copy("ho2000.json"))
         got = self.js("""import('/units.js').then(u => ['0.0255', '0.03', '1e-3', '-0.005', '0.1000', '12', '0', '.5', '1.23456789012345678', '5E2']
             .map(n => [n, u.shown_number('radius_m', n), u.written_number('radius_m', u.shown_number('radius_m', n))]))""")
@@ -166,6 +167,7 @@ class Round(FormCase):
                          [None, "0.0255", "7"])
 
     def test_every_number_has_its_unit(self):
+        self.needs_modules()
         keys = set()
 
         def numbers(schema, key):
@@ -244,18 +246,22 @@ class Edits(FormCase):
                 self.assertEqual(self.text(), begun)
 
     def test_every_change_of_shape(self):
+        self.needs_modules()
         self.decisions("ho2000.json", "/stimuli/0", ["stimuli", 0], "shape",
                        ["sphere", "cone", "cylinder", "cube", "box", "mesh", "none", "compound"])
 
     def test_every_change_of_task(self):
+        self.needs_modules()
         self.decisions("stiffness-2afc.json", "/blocks/1", ["blocks", 1], "task",
                        ["identify", "compare", "detect", "rate", "adjust", "external", "reach"])
 
     def test_every_change_of_procedure(self):
+        self.needs_modules()
         self.decisions("stiffness-2afc.json", "/blocks/1/procedure", ["blocks", 1, "procedure"], "kind",
                        ["constant", "staircase", "quest_plus", "limits", "ask"])
 
     def test_every_change_of_a_field(self):
+        self.needs_modules()
         self.decisions("force-field.json", "/stimuli/1/fields/0", ["stimuli", 1, "fields", 0], "kind",
                        ["constant", "spring", "channel", "viscous", "curl", "vibration"])
 
@@ -274,6 +280,7 @@ class Edits(FormCase):
         self.assertEqual(self.text(), before)
 
     def test_blocks_and_factors_keep_their_references(self):
+        self.needs_modules()
         for name, path, old in (("stiffness-2afc.json", ["stimuli", 0, "name"], "standard"), ("stiffness-surface-size.json", ["factors", 0, "name"], None),
                                 ("stiffness-surface-size.json", ["stimuli", 0, "name"], None), ("visual-haptic-size.json", ["blocks", 0, "name"], None),
                                 ("stiffness-two-groups.json", ["groups", "names", 1], "older"), ("tap-hardness.json", ["stimuli", 0, "name"], None)):

@@ -40,6 +40,11 @@ diff -r --exclude=DEBIAN "$root" "$scratch/installed"
 
 lintian --allow-root --fail-on error,warning "$package"
 
+# The page of a protocol, by the package's program alone and without network.
+unshare --net --map-root-user bash -c 'ip link set lo up && exec /usr/bin/python3 "$@"' bash \
+  tests/runner/design/design_browser_test.py "$root/usr/bin/palpate" "$root/usr/share/palpate/protocols" chromium Text Views \
+  > "$scratch/design.log" 2>&1 || { cat "$scratch/design.log" >&2; fail "palpate design does not work from the package"; }
+
 # The study by both programs, and all that is concluded from it. The package's knows nothing of the sources.
 study() {  # PALPATE PROTOCOLS FOLDER
   mkdir -p "$3/figures" && cd "$3"
