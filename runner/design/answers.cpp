@@ -107,6 +107,7 @@ Json as_json(const stimuli::FieldSpec& field) {
       out["axis"] = as_json(field.axis);
       break;
     case Kind::viscous:
+      out["resists"] = field.damping != decltype(field.damping){};
       break;
   }
   return out;

@@ -1,26 +1,32 @@
 // The stimuli at one scale beside the stylus. Dragging or the arrow keys turn each about its own centre.
 
 import {by_id, element} from './dom.js';
-import {extent_of, put_dot, put_field, put_rod} from './solids.js';
+import {extent_of, put_dot, put_field, put_rod, put_waves} from './solids.js';
 import {label_of, value_in_words} from './units.js';
 
 const {add, sub, times, size, surface_of, axes_of, painter, kLight, kDark} = palpate_drawing;
 const kGap = 0.14;    // of the largest stimulus
 const kFoot = 34;     // px below a row, for names
 const kHead = 26;     // px above all, for the scale
+const kOutOfSound = 1.37;  // of the surface, as far as the waves of its sound
 const kFieldAlone = 0.03, kOutOf = 1.4;  // m, of a field without a place; of the surface that it has
 const kGhost = 0.45;  // opacity of what is seen and not felt
 const kLeastLabel = 34;  // px of a cell that has room for a name
 const dark = matchMedia('(prefers-color-scheme: dark)');
 
+function members_in_words(part) {
+  return Object.entries(part).map(([key, value]) => {
+    if (Array.isArray(value) && value.some(one => typeof one === 'object' && !Array.isArray(one)))
+      return `${label_of(key)} (${value.map(one => members_in_words(one ?? {})).join('; ')})`;
+    return typeof value === 'object' && !Array.isArray(value) ? '' : `${label_of(key)} ${value_in_words(key, value)}`;
+  }).filter(Boolean).join(', ');
+}
+
 /** What a picture cannot show of a stimulus: its texture, fields, knock, layers, what is seen of it. */
 export function stimulus_in_words(stimulus) {
   const words = [];
   const told = (name, part) => {
-    if (part === null || typeof part !== 'object') return;
-    const values = Object.entries(part).map(([key, value]) =>
-        (typeof value === 'object' && !Array.isArray(value)) ? '' : `${label_of(key)} ${value_in_words(key, value)}`);
-    words.push(`${name}: ${values.filter(Boolean).join(', ')}`);
+    if (part !== null && typeof part === 'object') words.push(`${name}: ${members_in_words(part)}`);
   };
   told('texture', stimulus.texture);
   for (const field of stimulus.fields ?? []) told('field', field);
@@ -35,18 +41,18 @@ export function stimulus_in_words(stimulus) {
   return words;
 }
 
-/** What is drawn of a stimulus about its centre: surfaces of one colour each. */
-function parts_of({corners = [], triangles = [], marks, fields = []}, colour, opacity) {
+/** What is drawn of a stimulus about its centre: surfaces of one colour each. `sounds`: whether its contacts are heard. */
+function parts_of({corners = [], triangles = [], marks, fields = []}, {colour, opacity, sounds} = {}) {
   const ends = pick => [0, 1, 2].map(k => corners.reduce((v, p) => pick(v, p[k]), corners[0]?.[k] ?? 0));
   const centre = times(0.5, add(ends(Math.min), ends(Math.max)));
   const own = corners.map(p => sub(p, centre)), reach = own.reduce((r, p) => Math.max(r, size(p)), 0);
   const out = fields.some(field => extent_of(field) === 0) ? kOutOf : 1;
-  const radius = Math.max(out * reach, ...fields.map(extent_of), reach === 0 && fields.length ? kFieldAlone : 0);
+  const radius = Math.max((sounds ? kOutOfSound : out) * reach, out * reach, ...fields.map(extent_of), reach === 0 && fields.length ? kFieldAlone : 0);
   const parts = own.length ? [{mesh: surface_of(own, triangles), colour, opacity}] : [];
-  const put = (colour_of, fill) => {
+  const put = (colour_of, fill, origin = centre) => {
     const out = [];
     fill(out);
-    for (let i = 0; i < out.length; i += 6) [0, 1, 2].forEach(k => out[i + k] -= centre[k]);
+    for (let i = 0; i < out.length; i += 6) [0, 1, 2].forEach(k => out[i + k] -= origin[k]);
     if (out.length) parts.push({mesh: {vertices: new Float32Array(out)}, colour: colour_of});
   };
   put('virtual', out => {
@@ -54,6 +60,7 @@ function parts_of({corners = [], triangles = [], marks, fields = []}, colour, op
     marks?.dots.forEach(at => put_dot(out, at, 0.015 * reach));
   });
   put('force', out => fields.forEach(field => put_field(out, field, radius)));
+  if (sounds && reach > 0) put('ideal', out => put_waves(out, reach), [0, 0, 0]);
   return {parts, radius};
 }
 
@@ -94,10 +101,11 @@ export class PictureView {
   /** Shows an answer of "picture". `stimuli`: as the protocol has them, for what a picture cannot show. */
   show({stimuli: drawn, stylus}, protocol_stimuli) {
     const known = new Map(protocol_stimuli.map(one => [one?.name, stimulus_in_words(one ?? {})]));
+    const heard = new Set(protocol_stimuli.filter(one => one?.sound).map(one => one.name));
     const base = name => name.replace(/\[.*/, '');
     const stimuli = drawn.filter(one => known.has(base(one.name)));  // channels of a reach have no place of their own
-    this.shapes = stimuli.flatMap(one => [{name: one.name, size: one.size_m, ...parts_of(one)},
-      ...(one.seen ? [{name: `${one.name}, as seen`, label: 'as seen', size: one.seen.size_m, ...parts_of(one.seen, 'ideal', kGhost)}] : [])]).filter(one => one.parts.length > 0);
+    this.shapes = stimuli.flatMap(one => [{name: one.name, size: one.size_m, ...parts_of(one, {sounds: heard.has(base(one.name))})},
+      ...(one.seen ? [{name: `${one.name}, as seen`, label: 'as seen', size: one.seen.size_m, ...parts_of(one.seen, {colour: 'ideal', opacity: kGhost})}] : [])]).filter(one => one.parts.length > 0);
     this.stylus = stylus;
     this.root.querySelector('.sizes').replaceChildren(...stimuli.map(one => {
       const words = [one.size_m ? in_mm(one.size_m) : 'no surface', ...(known.get(base(one.name)) ?? [])];

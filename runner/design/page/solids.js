@@ -36,6 +36,25 @@ export function put_dot(out, at, radius) {
       for (const end of [ends[k], ends[(k + 1) % 4], pole]) out.push(...add(at, times(radius, end)), ...end);
 }
 
+/** Waves of a sound that leave a body of radius `reach`, m, at its upper right. */
+export function put_waves(out, reach) {
+  const kSteps = 10, kSpread = 0.6;  // rad to either side
+  for (const round of [1.15, 1.35]) {
+    const at = k => times(round * reach, [Math.cos(0.25 * Math.PI + kSpread * (2 * k / kSteps - 1)), 0, Math.sin(0.25 * Math.PI + kSpread * (2 * k / kSteps - 1))]);
+    for (let k = 0; k < kSteps; ++k) put_rod(out, at(k), at(k + 1), 0.02 * reach);
+  }
+}
+
+/** Dots of a medium within a ball. */
+function put_medium(out, reach) {
+  const kEach = 2;  // on either side of the centre
+  const steps = Array.from({length: 2 * kEach + 1}, (_, k) => reach * (k / kEach - 1));
+  for (const x of steps)
+    for (const y of steps)
+      for (const z of steps)
+        if (size([x, y, z]) <= 1.01 * reach) put_dot(out, [x, y, z], 0.035 * reach);
+}
+
 /** An arc about an axis through a centre, with an arrow at its end. */
 function put_turn(out, centre, axis, round, radius, turns) {
   const [x, y] = beside(axis), kSteps = 20;
@@ -51,7 +70,7 @@ export function extent_of(field) {
   return 0;
 }
 
-/** Adds a field: arrows along its force. `reach`: m, of what is drawn; what has no place of its own stands out of it. */
+/** Adds a field: arrows along its force; dots where it resists every movement. `reach`: m, of what is drawn; what has no place of its own stands out of it. */
 export function put_field(out, field, reach) {
   const thin = 0.03 * reach;
   if (field.kind === 'constant') {
@@ -78,6 +97,8 @@ export function put_field(out, field, reach) {
   } else if (field.kind === 'curl' && field.turns !== 0) {
     put_turn(out, [0, 0, 0], unit(field.axis), 0.9 * reach, thin, field.turns);
     put_rod(out, times(-0.9 * reach, unit(field.axis)), times(0.9 * reach, unit(field.axis)), 0.6 * thin);
+  } else if (field.kind === 'viscous' && field.resists) {
+    put_medium(out, reach);
   } else if (field.kind === 'vibration') {
     const half = times(0.95 * reach, unit(field.axis));
     put_arrow(out, [0, 0, 0], half, thin);

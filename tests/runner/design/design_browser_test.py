@@ -351,6 +351,30 @@ class Views(BrowserCase):
             self.assertEqual(f"{one['name']}, as seen" in names, bool(other), one)
         self.assertEqual(self.complaints(), [])
 
+    def test_sounds_and_viscous_fields_are_drawn(self):
+        path = self.copy("tap-hardness.json")
+        values = json.loads(path.read_text())
+        values["stimuli"] = [{**values["stimuli"][0], "fields": [{"kind": "viscous", "damping_ns_per_m": 2}]},
+                             {**values["stimuli"][1], "sound": {"kind": "modal", "modes": [{"frequency_hz": 400, "decay_per_s": 60}]}}]
+        path.write_text(json.dumps(values, indent=1))
+        self.page(path)
+        orange, blue = "(r, g, b) => r > 100 && r > 1.6 * g && g > 1.5 * b", "(r, g, b) => b > 100 && b > 1.3 * g && g > 1.5 * r"
+        parts = {one["name"]: [part.get("colour") for part in one["parts"]] for one in self.js("design.picture.shapes.map(one => ({name: one.name, parts: one.parts}))")}
+        self.assertEqual(parts, {"standard": [None, "force"], "comparison": [None, "ideal"]})
+        self.assertGreater(self.drawn(orange), 100)
+        heard = self.drawn(blue)
+        self.js("design.picture.shapes[1].parts.pop()")
+        self.assertGreater(heard, self.drawn(blue) + 50)  # the stylus stays
+        self.assertIn("modes (frequency 400 Hz, decay 60 1/s)", self.js("document.querySelector('#picture .sizes').textContent"))
+        for one in values["stimuli"]:
+            one.pop("fields", None)
+            one.pop("sound", None)
+        self.set_text(json.dumps(values, indent=1))
+        self.checked()
+        self.wait_for("design.picture.shapes.length === 2 && design.picture.shapes.every(one => one.parts.length === 1)")
+        self.assertEqual(self.drawn(orange), 0)
+        self.assertEqual(self.complaints(), [])
+
     def test_the_page_warns_of_another_study(self):
         path = self.copy("quick.json")
         subprocess.run([PALPATE, "simulate", path, "--db", self.dir / "study.db", "--participants", "2"], check=True, capture_output=True, timeout=PATIENCE)
