@@ -255,7 +255,7 @@ void judge_all(analysis::StudyTable table, const Registration& registered, Study
   check.label = analysis::label_of(table);
   const analysis::NamedResults results = analysis::named_results(
       analysis::study_json(study::analyze_study(std::move(table), registered.too_fast)),
-      registered.alpha);
+      alpha_at(registered, check.participants));
   for (const analysis::Hypothesis& one : registered.hypotheses)
     check.hypotheses.emplace_back(one, analysis::judge(one, results));
 }

@@ -274,26 +274,34 @@ CheckPoint of_order(const Registration& registered, const StudyData& study) {
   return out;
 }
 
+/// How many participants there should be when a study has n: at a planned look, those of the look.
+std::size_t planned_so_far(const Registration& registered, std::size_t n) {
+  const bool is_look = std::ranges::find(registered.looks, n, &analysis::Look::participants) !=
+                       registered.looks.end();
+  return is_look ? n : registered.participants;
+}
+
 /// "point, then ray" -> number of participants.
 using OrderCounts = std::map<std::string, std::size_t>;
 
-/// Empty where the order is not counterbalanced.
-OrderCounts registered_orders(const Registration& registered) {
+/// Of the first participants. Empty where the order is not counterbalanced.
+OrderCounts registered_orders(const Registration& registered, std::size_t participants) {
   OrderCounts out;
   const protocols::Protocol& protocol = registered.protocol;
   const auto orders = static_cast<std::size_t>(protocols::block_orders(protocol));
   if (orders < 2) return out;
   // With groups in permuted blocks nothing repeats.
-  const std::size_t repeat = protocol.groups.any() ? registered.participants : orders;
-  for (std::size_t i = 0; i < std::min(repeat, registered.participants); ++i)
+  const std::size_t repeat = protocol.groups.any() ? participants : orders;
+  for (std::size_t i = 0; i < std::min(repeat, participants); ++i)
     out[study::condition_order(protocol, static_cast<int>(i) + 1)] +=
-        (registered.participants - i + repeat - 1) / repeat;
+        (participants - i + repeat - 1) / repeat;
   return out;
 }
 
 /// "Order of the renderers: point, then ray: 3 (3 registered); ray, then point: 0 (3 registered)."
 std::string orders_text(const Registration& statement, const StudyData& study) {
-  OrderCounts registered = registered_orders(statement);
+  OrderCounts registered =
+      registered_orders(statement, planned_so_far(statement, study.participants.size()));
   if (registered.empty()) return "";
   OrderCounts shown;
   for (const StudyParticipant& one : study.participants) {
@@ -319,10 +327,34 @@ std::vector<data::Participant> people_without_trials(const StudyData& study) {
   return out;
 }
 
+/// Which of the planned looks the study is at, and its alpha.
+CheckPoint of_looks(const Registration& registered, const StudyData& study) {
+  const auto& looks = registered.looks;
+  const std::size_t n = study.participants.size();
+  const auto at = std::ranges::find(looks, n, &analysis::Look::participants);
+  CheckPoint out{"looks", "Looks", Finding::as_registered, ""};
+  if (at == looks.end()) {
+    out.finding = Finding::deviation;
+    out.sentence = counted(n, "participant", "participants") +
+                   ": no look was registered at this number. Hypotheses that compare with alpha "
+                   "stay undecided.";
+  } else {
+    out.sentence = "Look " + std::to_string(at - looks.begin() + 1) + " of " +
+                   std::to_string(looks.size()) + ", as registered: alpha is " +
+                   analysis::short_number(at->alpha) + " at this look.";
+    if (at + 1 != looks.end())
+      out.sentence += " Whether the study ends here is what the registration says of its end.";
+  }
+  for (const analysis::Look& look : looks)
+    out.evidence.push_back(std::to_string(look.participants) + " participants: alpha " +
+                           analysis::short_number(look.alpha));
+  return out;
+}
+
 /// Whose data are there, by number. A sample that is selected afterwards shows in the numbers,
 /// which are given in the order of arrival, or in the removals.
 CheckPoint of_participants(const Registration& registered, const StudyData& study) {
-  const std::size_t n = study.participants.size(), planned = registered.participants;
+  const std::size_t n = study.participants.size(), planned = planned_so_far(registered, n);
   CheckPoint out{"participants", "Participants", Finding::as_registered,
                  counted(n, "participant", "participants") + " with the numbers 1 to " +
                      std::to_string(planned) + ", as registered; nobody was removed."};
@@ -691,6 +723,10 @@ std::vector<CheckPoint> points_of_trials(const Registration& registered, const s
       of_order(registered, study),         of_participants(registered, study),
       of_trials(registered, study),        of_people(study),
       of_exclusion(registered, reported),  of_alpha(registered, reported)};
+  if (!registered.looks.empty()) {
+    const auto participants = std::ranges::find(out, "participants", &CheckPoint::id);
+    out.insert(participants + 1, of_looks(registered, study));
+  }
   if (has_movements(registered.protocol)) {
     const auto trials = std::ranges::find(out, "trials", &CheckPoint::id);
     out.insert(trials + 1, of_movements(registered, study));
@@ -753,7 +789,8 @@ StudyCheck check_study(const Registration& registered, const std::string& folder
   const std::string name = keep_study_named(registered.protocol.name, study);
   const analysis::StudyTable table = study::read_study(store, name).table;
   const analysis::NamedResults results = analysis::named_results(
-      analysis::study_json(study::analyze_study(table, registered.too_fast)), registered.alpha);
+      analysis::study_json(study::analyze_study(table, registered.too_fast)),
+      alpha_at(registered, study.participants.size()));
 
   StudyCheck out;
   out.label = analysis::label_of(table);

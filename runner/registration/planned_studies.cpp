@@ -567,8 +567,8 @@ std::vector<Rehearsal> rehearse(const PlannedStudies& planned, const Registratio
   std::mutex mutex;
   const auto one_study = [&](std::size_t i) {
     const bool with_effect = i < studies;
-    const analysis::NamedResults results =
-        analysis::named_results(planned.analyzed(i % studies, with_effect), made.alpha);
+    const analysis::NamedResults results = analysis::named_results(
+        planned.analyzed(i % studies, with_effect), alpha_at(made, made.participants));
     std::vector<analysis::Verdict> verdicts;
     verdicts.reserve(hypotheses.size());
     for (const analysis::Hypothesis& one : hypotheses)

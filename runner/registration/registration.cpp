@@ -1,6 +1,7 @@
 #include "runner/registration/registration.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <filesystem>
@@ -76,8 +77,9 @@ VerdictCounts read_counts(ObjectReader& reader, const char* key) {
   return out;
 }
 
-/// What registration.json says of its other files.
+/// What registration.json says that follows from other values.
 struct Stated {
+  std::vector<double> look_alphas;
   std::string protocol_sha256, plan_sha256;
   std::vector<std::string> file_sha256, hypothesis_ids;
 };
@@ -105,7 +107,32 @@ void read_files(ObjectReader& reader, Registration& out, Stated& stated) {
       Presence::required);
 }
 
-void read_study(ObjectReader& reader, Registration& out) {
+void read_looks(ObjectReader& analysis, Registration& out, Stated& stated) {
+  if (!analysis.has("looks")) return;
+  std::vector<std::size_t> at;
+  read_objects(analysis, "looks", 1, kMostLooks, [&](ObjectReader& look) {
+    const double least = at.empty() ? kFewestParticipants : static_cast<double>(at.back() + 1);
+    look.count("participants", at.emplace_back(), {least, static_cast<double>(out.participants)});
+    look.number("alpha", stated.look_alphas.emplace_back(), {0, 1}, Presence::required);
+  });
+  std::string spending;
+  analysis.text("spending", spending, kMostWord);
+  const auto known = spending_of(spending);
+  if (!known)
+    analysis.faults().add(
+        analysis.pointer("spending"),
+        "expected obrien-fleming or pocock, found '" + printable(spending, 60) + "'");
+  if (at.empty() || at.back() != out.participants) {
+    analysis.faults().add(
+        analysis.pointer("looks"),
+        "expected the last look at all " + std::to_string(out.participants) + " participants");
+  } else if (analysis.faults().empty() && known) {
+    out.spending = *known;
+    out.looks = analysis::planned_looks(out.spending, out.alpha, at);
+  }
+}
+
+void read_study(ObjectReader& reader, Registration& out, Stated& stated) {
   std::size_t trials = 0;
   reader.count("participants", out.participants, {kFewestParticipants, kMostParticipants});
   reader.count("trials_per_participant", trials, {1, kMostCount});
@@ -115,6 +142,7 @@ void read_study(ObjectReader& reader, Registration& out) {
         analysis.number("too_fast_s", out.too_fast, {0, kMostTooFast, "s", true},
                         Presence::required);
         analysis.number("alpha", out.alpha, {0, 1, "", true}, Presence::required);
+        read_looks(analysis, out, stated);
       },
       Presence::required);
   read_objects(reader, "orders", out.participants, out.participants, [&](ObjectReader& order) {
@@ -187,7 +215,7 @@ Stated read_statement(const std::string& text, const std::string& path, Registra
   reader.text("program_version", out.program_version, kMostWord);
   reader.text("build", out.build, kMostWord);
   read_files(reader, out, stated);
-  read_study(reader, out);
+  read_study(reader, out, stated);
   read_simulation(reader, out, stated);
   reader.count("sessions_so_far", out.sessions_so_far, {0, kMostCount});
   if (const auto* list = reader.array("warnings", 0, kMostFiles, Presence::required)) {
@@ -214,6 +242,11 @@ std::vector<std::string> contradictions_of(const Registration& read, const State
   compare("plan.json", read.plan_text, stated.plan_sha256);
   for (std::size_t i = 0; i < read.files.size(); ++i)
     compare(printable(read.files[i].name, 200), read.files[i].bytes, stated.file_sha256[i]);
+  for (std::size_t k = 0; k < read.looks.size(); ++k)
+    if (std::abs(read.looks[k].alpha - stated.look_alphas[k]) > 1e-9)
+      out.push_back("registration.json states another alpha of the look at " +
+                    std::to_string(read.looks[k].participants) +
+                    " participants than its spending gives");
   std::vector<std::string> ids;
   for (const analysis::Hypothesis& one : read.hypotheses) ids.push_back(one.id);
   if (ids != stated.hypothesis_ids)
@@ -227,6 +260,23 @@ void VerdictCounts::add(analysis::Verdict verdict) {
   corroborated += verdict == analysis::Verdict::corroborated;
   refuted += verdict == analysis::Verdict::refuted;
   undecided += verdict == analysis::Verdict::undecided;
+}
+
+const char* to_string(analysis::Spending spending) {
+  return spending == analysis::Spending::pocock ? "pocock" : "obrien-fleming";
+}
+
+std::optional<analysis::Spending> spending_of(const std::string& name) {
+  for (const auto one : {analysis::Spending::obrien_fleming, analysis::Spending::pocock})
+    if (name == to_string(one)) return one;
+  return std::nullopt;
+}
+
+double alpha_at(const Registration& registration, std::size_t participants) {
+  if (registration.looks.empty()) return registration.alpha;
+  const auto at =
+      std::ranges::find(registration.looks, participants, &analysis::Look::participants);
+  return at == registration.looks.end() ? std::nan("") : at->alpha;
 }
 
 const std::vector<std::string>& files_to_fill_in() {
@@ -251,6 +301,10 @@ std::string registration_json(const Registration& registration) {
   out["participants"] = registration.participants;
   out["trials_per_participant"] = study::planned_trials(protocol);
   out["analysis"] = {{"too_fast_s", registration.too_fast}, {"alpha", registration.alpha}};
+  for (const analysis::Look& look : registration.looks)
+    out["analysis"]["looks"].push_back(
+        {{"participants", look.participants}, {"alpha", look.alpha}});
+  if (!registration.looks.empty()) out["analysis"]["spending"] = to_string(registration.spending);
   out["orders"] = Json::array();
   for (std::size_t i = 0; i < registration.order_sha256.size(); ++i)
     out["orders"].push_back(

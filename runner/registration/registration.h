@@ -10,6 +10,7 @@
 
 #include "analysis/report/hypotheses.h"
 #include "analysis/report/plan_record.h"
+#include "analysis/statistics/sequential_looks.h"
 #include "data/record.h"
 #include "protocols/protocol.h"
 #include "runner/registration/form.h"
@@ -41,7 +42,9 @@ struct Registration {
   std::string hypotheses_text;  ///< hypotheses.json, byte for byte
   std::vector<analysis::Hypothesis> hypotheses;
   std::size_t participants = 0;
-  double too_fast = 0.2, alpha = 0.05;    ///< s; of the tests
+  double too_fast = 0.2, alpha = 0.05;  ///< s; of the tests, all looks together
+  std::vector<analysis::Look> looks;    ///< before the end and at it; none: at the end alone
+  analysis::Spending spending = analysis::Spending::obrien_fleming;  ///< of alpha over the looks
   std::vector<std::string> order_sha256;  ///< of participant number 1, 2, ...
   int participant_version = 0;            ///< default of the simulated participant
   std::string participant_sha256;         ///< its settings
@@ -57,8 +60,17 @@ struct Registration {
 /// The files that the lab fills in: their checksums are not listed.
 const std::vector<std::string>& files_to_fill_in();
 
+/// "obrien-fleming"
+const char* to_string(analysis::Spending spending);
+/// nullopt: none of the names
+std::optional<analysis::Spending> spending_of(const std::string& name);
+
+/// What "alpha" is in a hypothesis when a study has so many participants: that of the look, if
+/// looks are planned; NaN: none is planned then.
+double alpha_at(const Registration& registration, std::size_t participants);
+
 /// The fewest and most participants of a registration.
-inline constexpr std::size_t kFewestParticipants = 2, kMostParticipants = 10'000;
+inline constexpr std::size_t kFewestParticipants = 2, kMostParticipants = 10'000, kMostLooks = 20;
 /// s, largest limit of too fast answers.
 inline constexpr double kMostTooFast = 60;
 

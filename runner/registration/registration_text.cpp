@@ -91,13 +91,42 @@ class Questions {
 
   std::vector<Paragraph> stopping() const {
     std::vector<Paragraph> answer = {
-        text("The study ends with the number of participants above. No test is made before; "
-             "sequential looks are not planned.")};
+        text(made_.looks.empty()
+                 ? "The study ends with the number of participants above. No test is made before; "
+                   "sequential looks are not planned."
+                 : looks_in_words())};
     for (Paragraph& more : study_->stopping()) answer.push_back(std::move(more));
     answer.push_back(
         fill_in("when data collection ends if that number is not reached, and how "
                 "participants who withdraw are replaced."));
+    if (!made_.looks.empty())
+      answer.push_back(fill_in(
+          "which hypotheses, once corroborated or refuted at a look, end the study there."));
     return answer;
+  }
+
+  std::string looks_in_words() const {
+    std::string at, alphas;
+    for (const analysis::Look& look : made_.looks) {
+      const bool first = at.empty(), last = &look == &made_.looks.back();
+      const char* const between = first ? "" : last ? " and " : ", ";
+      at += between + std::to_string(look.participants);
+      alphas += between + analysis::short_number(look.alpha);
+    }
+    const bool pocock = made_.spending == analysis::Spending::pocock;
+    return "The hypotheses are judged after " + at +
+           " participants, in the order of their numbers, and at no other time. The study ends "
+           "with the last of these numbers, or before as said below. Alpha " +
+           analysis::short_number(made_.alpha) +
+           " is spent over these looks (Lan & DeMets 1983, the function that resembles the bounds "
+           "of " +
+           (pocock ? "Pocock" : "O'Brien and Fleming") +
+           ", two-sided, information in proportion to the participants): alpha in the hypotheses "
+           "is " +
+           alphas +
+           " at the looks. An interval of 95 % at a look before the last does not allow for the "
+           "looks. The simulated studies of question 2 have all participants and are judged at the "
+           "last look.";
   }
 
   Question study_type() const {

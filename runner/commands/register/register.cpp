@@ -1,6 +1,7 @@
 // `palpate register`: a registration of a study, before its first session.
 
 #include <algorithm>
+#include <charconv>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -9,6 +10,7 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <sstream>
 #include <stdexcept>
 #include <string>
 #include <thread>
@@ -51,10 +53,38 @@ struct RegisterOptions {
   std::string protocol, plan, hypotheses, out, database;
   std::size_t participants = 0, jobs = 1;
   std::optional<std::size_t> studies;
+  std::vector<std::size_t> looks;
+  analysis::Spending spending = analysis::Spending::obrien_fleming;
   double too_fast = 0.2;
   std::uint64_t seed = 1;
   bool force = false;
 };
+
+/// "12,18,24".
+std::vector<std::size_t> read_looks(const std::string& option) {
+  const auto fail = [&] {
+    throw UsageError(
+        "--looks: expected numbers of participants that rise, such as 12,18,24, at "
+        "most " +
+        std::to_string(registration::kMostLooks) + " of them and each from " +
+        std::to_string(registration::kFewestParticipants) + " to " +
+        std::to_string(registration::kMostParticipants) + ", found '" + printable(option, 80) +
+        "'");
+  };
+  std::vector<std::size_t> out;
+  std::istringstream stream(option);
+  for (std::string word; std::getline(stream, word, ',');) {
+    std::size_t value = 0;
+    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+    if (error != std::errc() || end != word.data() + word.size() ||
+        value < registration::kFewestParticipants || value > registration::kMostParticipants ||
+        (!out.empty() && value <= out.back()))
+      fail();
+    out.push_back(value);
+  }
+  if (out.empty() || out.size() > registration::kMostLooks || option.ends_with(',')) fail();
+  return out;
+}
 
 std::optional<RegisterOptions> parse_options(const std::vector<std::string>& args) {
   RegisterOptions options;
@@ -62,7 +92,7 @@ std::optional<RegisterOptions> parse_options(const std::vector<std::string>& arg
   CommandLine line;
   line.usage =
       "palpate register PROTOCOL.json --plan plan.json --hypotheses hypotheses.json --out FOLDER\n"
-      "       [--participants N] [--too-fast-s SECONDS] [--db FILE] [--force]";
+      "       [--participants N] [--looks N,N,N] [--too-fast-s SECONDS] [--db FILE] [--force]";
   line.summary =
       "Makes a registration of a study before its first session: a folder with the answers to the\n"
       "questions of the OSF Preregistration form that protocol and plan give, the hypotheses as\n"
@@ -86,6 +116,12 @@ hypotheses.json:
   add("out", po::value(&options.out)->required()->value_name("FOLDER"), "a new folder");
   add("participants", po::value(&options.participants)->value_name("N"),
       "planned number; default: that of the plan");
+  std::string looks, spending = registration::to_string(options.spending);
+  add("looks", po::value(&looks)->value_name("N,N,N"),
+      "participants after which the hypotheses are judged, the last of all; alpha is spent over "
+      "these looks, and 'alpha' in a hypothesis is that of the look; default: at the end alone");
+  add("spending", po::value(&spending)->default_value(spending)->value_name("FUNCTION"),
+      "of alpha over the looks: obrien-fleming (little at first) or pocock (much at first)");
   add("too-fast-s", po::value(&options.too_fast)->default_value(0.2, "0.2")->value_name("SECONDS"),
       "correct answers faster than this will be excluded from the times");
   add("db", po::value(&options.database)->value_name("FILE"),
@@ -112,6 +148,14 @@ hypotheses.json:
   if (values->count("studies")) options.studies = studies;
   if (options.studies && (*options.studies < 20 || *options.studies > 100'000))
     throw UsageError("--studies: must be 20 to 100000");
+  if (!looks.empty()) options.looks = read_looks(looks);
+  const auto known = registration::spending_of(spending);
+  if (!known)
+    throw UsageError("--spending: expected obrien-fleming or pocock, found '" +
+                     printable(spending, 60) + "'");
+  if (!values->operator[]("spending").defaulted() && looks.empty())
+    throw UsageError("--spending: alpha is spent over looks; give --looks, too");
+  options.spending = *known;
   if (options.jobs < 1 || options.jobs > 256) throw UsageError("--jobs: must be 1 to 256");
   return options;
 }
@@ -194,6 +238,11 @@ void warn_of_hypothesis(const analysis::Hypothesis& one, const registration::Reh
                   analysis::fixed(100 * wanted_power, 0) + " %.");
 }
 
+bool names_alpha(const analysis::Hypothesis& one) {
+  const auto numbers = analysis::judge(one, {}).numbers;
+  return std::ranges::any_of(numbers, [](const auto& number) { return number.first == "alpha"; });
+}
+
 std::vector<std::string> warnings_of(const registration::Registration& made) {
   std::vector<std::string> out;
   const auto& curve = registration::fitting_curve(made.protocol, made.plan);
@@ -219,6 +268,11 @@ std::vector<std::string> warnings_of(const registration::Registration& made) {
     out.emplace_back(
         "The plan is of a difference between two conditions; the protocol has one. The simulated "
         "studies with the planned effect and with none are alike.");
+  for (const analysis::Hypothesis& one : made.hypotheses)
+    if (!made.looks.empty() && !names_alpha(one))
+      out.push_back(one.id +
+                    " does not name alpha: its conditions are the same at each look, and all looks "
+                    "together err more often than alpha.");
   for (std::size_t h = 0; h < made.hypotheses.size(); ++h)
     warn_of_hypothesis(made.hypotheses[h], made.rehearsals[h], made.plan.power, out);
   return out;
@@ -297,6 +351,14 @@ int register_command(const std::vector<std::string>& args) {
   made.build = build_description();
   made.too_fast = options.too_fast;
   made.alpha = made.plan.alpha;
+  if (!options.looks.empty()) {
+    if (options.looks.back() != made.participants)
+      throw UsageError("--looks: expected the last look at all " +
+                       std::to_string(made.participants) + " participants, found " +
+                       std::to_string(options.looks.back()));
+    made.spending = options.spending;
+    made.looks = analysis::planned_looks(made.spending, made.alpha, options.looks);
+  }
   made.seed = options.seed;
   made.typical_time = registration::typical_time(made.protocol, made.too_fast);
   made.participant_version = participants::kDefaultParticipantVersion;

@@ -544,6 +544,73 @@ class Check(Study):
         self.write("registration/protocol.json", protocol)
         self.assertIn("stored with the protocol", self.check(status=2).stderr)
 
+class Looks(Study):
+    """A study that is looked at after 4, 6 and 8 participants."""
+
+    def setUp(self):
+        super().setUp()
+        self.write("h.json", [HYPOTHESES[0] | {"corroborated": "paired.cone.p_holm < alpha && alpha > 0"}, HYPOTHESES[0] | {"id": "H2"}])
+        self.said = self.register("--participants", "8", "--looks", "4,6,8", hypotheses="h.json", studies="20")
+        self.levels = {one["participants"]: one["alpha"] for one in json.loads((self.dir / "new/registration.json").read_text())["analysis"]["looks"]}
+
+    def check(self, participants, status):
+        database = self.dir / f"{participants}.db"
+        if not database.exists():
+            run("simulate", "quick.json", "--db", database, "--participants", participants, folder=self.dir)
+        run("check", "new", "--db", database, "--json", f"{participants}.json", "--force", status=status, folder=self.dir)
+        checked = json.loads((self.dir / f"{participants}.json").read_text())
+        return {one["id"]: one for one in checked["points"]}, checked["hypotheses"][0]
+
+    def test_each_look_has_its_own_alpha(self):
+        # O'Brien and Fleming's bounds at half, three quarters and all of the information.
+        self.assertEqual([round(level, 4) for level in self.levels.values()], [0.0031, 0.0183, 0.0440])
+        for n, level in self.levels.items():
+            points, hypothesis = self.check(n, 0)
+            self.assertEqual(points["participants"]["finding"], "as registered")
+            self.assertEqual(points["looks"]["finding"], "as registered")
+            self.assertEqual(hypothesis["numbers"]["alpha"], level)
+
+    def test_another_look_is_a_deviation(self):
+        points, hypothesis = self.check(5, 1)
+        self.assertEqual({points[one]["finding"] for one in ("participants", "looks")}, {"deviation"})
+        self.assertEqual(hypothesis["verdict"], "undecided")
+        self.assertIsNone(hypothesis["numbers"]["alpha"])
+
+    def test_a_selected_look_is_a_deviation(self):
+        run("simulate", "quick.json", "--db", "4.db", "--participants", 5, folder=self.dir)
+        run("forget", "--participant", "S002", "--db", "4.db", "--yes", folder=self.dir)
+        points, _ = self.check(4, 1)
+        self.assertEqual(points["participants"]["finding"], "deviation")
+
+    def test_the_looks_are_registered_in_words(self):
+        text = (self.dir / "new/registration.md").read_text()
+        for part in ("after 4, 6 and 8 participants", "0.003051, 0.01832 and 0.044", "Fleming", "end the study there"):
+            self.assertIn(part, text)
+        self.assertNotIn("not planned", text)
+        self.assertIn("H2 does not name alpha", self.said.stderr)
+        self.assertNotIn("H1 does not name alpha", self.said.stderr)
+
+    def test_a_changed_level_is_named(self):
+        path = self.dir / "new/registration.json"
+        path.write_text(path.read_text().replace(str(self.levels[6]), "0.05"))
+        points, _ = self.check(6, 1)
+        self.assertIn("another alpha of the look at 6 participants", json.dumps(points["registration"]))
+
+    def test_looks_that_are_none_are_refused(self):
+        for looks, words in (("4,4,8", "numbers of participants that rise"), ("4,x,8", "rise"), ("4,8,", "rise"), ("1,8", "rise"),
+                             ("4,6", "the last look at all 8 participants")):
+            said = self.register("--participants", "8", "--looks", looks, status=2, out="other").stderr
+            self.assertIn(words, said)
+        said = self.register("--participants", "8", "--looks", "4,8", "--spending", "all", status=2, out="other").stderr
+        self.assertIn("expected obrien-fleming or pocock", said)
+        self.assertFalse((self.dir / "other").exists())
+
+    def test_a_bundle_of_a_look(self):
+        self.check(6, 0)
+        self.write("about.json", {"version": 1, "authors": [{"name": "Ada Example"}], "license": "CC-BY-4.0"})
+        run("bundle", "--db", "6.db", "--registration", "new", "--about", "about.json", "--out", "kept", folder=self.dir)
+        run("bundle", "--verify", "kept", folder=self.dir)
+
 
 if __name__ == "__main__":
     unittest.main(argv=[sys.argv[0]])
