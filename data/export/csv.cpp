@@ -164,6 +164,13 @@ ExportResult export_csv(Store& store, const std::string& path, const ExportSetti
   return result;
 }
 
+void export_codebook(Store& store, const std::string& path, const ExportSettings& settings) {
+  FileSink file(path);
+  write_codebook(file, all_facts(label_protocols(store, settings)), settings,
+                 ExportClock(store, settings.times));
+  file.close(false);
+}
+
 std::int64_t export_sweep_csv(SweepFile& sweep, const std::string& path, bool force,
                               const std::function<void(std::int64_t)>& progress) {
   ProtectedFiles others;

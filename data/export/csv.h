@@ -35,6 +35,9 @@ inline ExportResult export_csv(Store& store, const std::string& path, bool force
   return export_csv(store, path, ExportSettings{.force = force});
 }
 
+/// Writes what the columns and codes of export_csv() mean, a new file. \throws StoreError
+void export_codebook(Store& store, const std::string& path, const ExportSettings& settings);
+
 /// Export of a sweep as CSV: one row a point.
 /// Writes the points on record, in order, with the columns of sweep_columns(). As export_csv()
 /// writes: RFC 4180, the shortest texts of numbers that read back exactly, texts guarded; complete

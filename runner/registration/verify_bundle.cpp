@@ -18,6 +18,7 @@
 #include "data/export/study_about.h"
 #include "runner/registration/bundle_contents.h"
 #include "runner/registration/sealed_folder.h"
+#include "runner/registration/verify_descriptions.h"
 #include "runner/usage_error.h"
 
 namespace palpate::runner::registration {
@@ -401,6 +402,8 @@ int verify_bundle(const std::string& folder, const std::string& digest) {
   compare_derived(folder, facts, out);
   compare_tables(folder, facts, out);
   compare_copies(folder, facts, out);
+  out.result("the meanings of columns and values, by the protocols",
+             description_faults(folder, facts));
   if (!digest.empty()) compare_digest(facts, digest, out);
   if (!out.all_same()) note_other_version(folder);
   print_conclusion(facts);
