@@ -21,9 +21,9 @@ std::int64_t difference(std::int64_t a, std::int64_t b) {
 
 /// The factors of all protocols, each once, with the levels of all; a level that protocols set in
 /// different ways has all of them.
-std::vector<StoredFactor> factors_of(Store& store) {
+std::vector<StoredFactor> factors_of(const std::vector<ProtocolInfo>& protocols) {
   std::vector<StoredFactor> out;
-  for (const ProtocolInfo& protocol : store.protocols()) {
+  for (const ProtocolInfo& protocol : protocols) {
     for (const StoredFactor& factor : read_stored_protocol(protocol.text).factors) {
       auto known = std::ranges::find(out, factor.name, &StoredFactor::name);
       if (known == out.end()) known = out.insert(out.end(), {factor.name, {}});
@@ -40,31 +40,33 @@ std::vector<StoredFactor> factors_of(Store& store) {
   return out;
 }
 
-bool have_reaches(Store& store) {
+bool have_reaches(const std::vector<ProtocolInfo>& protocols) {
   const auto reaches = [](const StoredBlock& block) { return block.task == "reach"; };
-  return std::ranges::any_of(store.protocols(), [&](const ProtocolInfo& protocol) {
+  return std::ranges::any_of(protocols, [&](const ProtocolInfo& protocol) {
     return std::ranges::any_of(read_stored_protocol(protocol.text).blocks, reaches);
   });
 }
 
 /// Whether any protocol has something.
-bool have(Store& store, bool StoredProtocol::*what) {
-  return std::ranges::any_of(store.protocols(), [what](const ProtocolInfo& protocol) {
+bool have(const std::vector<ProtocolInfo>& protocols, bool StoredProtocol::*what) {
+  return std::ranges::any_of(protocols, [what](const ProtocolInfo& protocol) {
     return read_stored_protocol(protocol.text).*what;
   });
 }
 
 }  // namespace
 
-ExportClock::ExportClock(Store& store, Times times)
+ExportClock::ExportClock(const std::vector<ProtocolInfo>& protocols, Times times)
     : times_(times),
-      tasks_(have_blocks(store.protocols())),
-      reaches_(have_reaches(store)),
-      seen_(have(store, &StoredProtocol::has_view)),
-      heard_(have(store, &StoredProtocol::has_sound)),
-      torque_(store),
-      groups_(store),
-      factors_(factors_of(store)) {
+      tasks_(have_blocks(protocols)),
+      reaches_(have_reaches(protocols)),
+      seen_(have(protocols, &StoredProtocol::has_view)),
+      heard_(have(protocols, &StoredProtocol::has_sound)),
+      groups_(protocols),
+      factors_(factors_of(protocols)) {}
+
+ExportClock::ExportClock(Store& store, Times times) : ExportClock(store.protocols(), times) {
+  torque_ = TorqueNotes(store);
   if (relative()) firsts_ = store.first_onsets();
 }
 

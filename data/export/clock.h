@@ -19,6 +19,8 @@ namespace palpate::data {
 class ExportClock {
  public:
   ExportClock(Store& store, Times times);
+  /// For the columns alone: without sessions, and so without times and torque_driven.
+  ExportClock(const std::vector<ProtocolInfo>& protocols, Times times);
   ExportClock() : times_(Times::absolute) {}
 
   /// Whether rows of trials have the columns of tasks: a protocol of the database has blocks.

@@ -154,7 +154,12 @@ ExportResult export_csv(Store& store, const std::string& path, const ExportSetti
   }
   if (!paths.codebook.empty()) {
     write_file(paths.codebook, [&](TextSink& sink) {
-      write_codebook(sink, all_facts(label_protocols(store, settings)), settings, clock);
+      DelimitedRow row(DelimitedFormat::csv);
+      for (const CodebookRow& cells :
+           codebook_rows(all_facts(label_protocols(store, settings)), settings, clock)) {
+        for (const std::string& cell : cells) row << cell;
+        sink.write(row.end());
+      }
     });
   }
   result.simulated = participants.any_simulated();
@@ -164,11 +169,16 @@ ExportResult export_csv(Store& store, const std::string& path, const ExportSetti
   return result;
 }
 
-void export_codebook(Store& store, const std::string& path, const ExportSettings& settings) {
-  FileSink file(path);
-  write_codebook(file, all_facts(label_protocols(store, settings)), settings,
-                 ExportClock(store, settings.times));
-  file.close(false);
+std::vector<CodebookRow> codebook_of(const std::vector<ProtocolInfo>& protocols,
+                                     const ExportSettings& settings) {
+  std::map<std::string, StudyLabel> labels;
+  for (const ProtocolInfo& protocol : protocols)
+    labels[protocol.sha256].facts = settings.facts(protocol);
+  std::vector<CodebookRow> rows =
+      codebook_rows(all_facts(labels), settings, ExportClock(protocols, settings.times));
+  for (CodebookRow& row : rows)
+    for (std::string& text : row) text = guarded_text(text);
+  return rows;
 }
 
 std::int64_t export_sweep_csv(SweepFile& sweep, const std::string& path, bool force,

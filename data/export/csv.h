@@ -1,9 +1,11 @@
 #pragma once
 // Export as CSV: one row per trial.
 
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "data/export/clock.h"
 #include "data/export/settings.h"
@@ -35,8 +37,14 @@ inline ExportResult export_csv(Store& store, const std::string& path, bool force
   return export_csv(store, path, ExportSettings{.force = force});
 }
 
-/// Writes what the columns and codes of export_csv() mean, a new file. \throws StoreError
-void export_codebook(Store& store, const std::string& path, const ExportSettings& settings);
+/// table, column, unit, value, meaning: a row for each column, followed by one for each of its
+/// codes or fault bits. The first row holds these names.
+using CodebookRow = std::array<std::string, 5>;
+
+/// The codebook that export_csv() writes for a database with these protocols, its texts guarded,
+/// without the rows of the column torque_driven, which sessions add.
+std::vector<CodebookRow> codebook_of(const std::vector<ProtocolInfo>& protocols,
+                                     const ExportSettings& settings);
 
 /// Export of a sweep as CSV: one row a point.
 /// Writes the points on record, in order, with the columns of sweep_columns(). As export_csv()

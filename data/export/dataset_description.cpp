@@ -12,19 +12,16 @@ namespace palpate::data {
 namespace {
 
 void describe_table(const char* table, std::span<const Column> columns, const ProtocolFacts& facts,
-                    const ExportSettings& settings, TextSink& out) {
-  DelimitedRow row(DelimitedFormat::csv);
+                    const ExportSettings& settings, std::vector<CodebookRow>& out) {
   for (const Column& column : columns) {
     const std::string unit = unit_of(column, facts);
-    row << table << column.name << unit << "" << column.description;
-    out.write(row.end());
+    out.push_back({table, column.name, unit, "", column.description});
     for (const auto& values :
          {column_levels(column, facts), column_bits(column, settings.fault_bits)}) {
-      for (const auto& [value, meaning] : values.items()) {
-        // Names of stimuli are guarded already: DelimitedRow would guard them twice.
-        row << table << column.name << unit << unguarded(value) << meaning.get<std::string>();
-        out.write(row.end());
-      }
+      // Names of stimuli are guarded already.
+      for (const auto& [value, meaning] : values.items())
+        out.push_back(
+            {table, column.name, unit, std::string(unguarded(value)), meaning.get<std::string>()});
     }
   }
 }
@@ -96,25 +93,16 @@ void add_answers(nlohmann::ordered_json& levels, const ProtocolFacts& facts) {
 
 }  // namespace
 
-void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSettings& settings,
-                    const ExportClock& clock) {
-  DelimitedRow row(DelimitedFormat::csv);
-  row << "table"
-      << "column"
-      << "unit"
-      << "value"
-      << "meaning";
-  out.write(row.end());
+std::vector<CodebookRow> codebook_rows(const ProtocolFacts& facts, const ExportSettings& settings,
+                                       const ExportClock& clock) {
+  std::vector<CodebookRow> out = {{"table", "column", "unit", "value", "meaning"}};
   describe_table("trials", trial_columns(clock), facts, settings, out);
   describe_table("attempts", attempt_columns(clock), facts, settings, out);
-  if (!settings.pages) return;
+  if (!settings.pages) return out;
   describe_table("pages", page_columns(), facts, settings, out);
-  for (const auto& [place, question] : facts.questions) {
-    row << "pages"
-        << "item"
-        << "" << place << question;
-    out.write(row.end());
-  }
+  for (const auto& [place, question] : facts.questions)
+    out.push_back({"pages", "item", "", place, question});
+  return out;
 }
 
 void write_protocol_files(Store& store, const StudyLabel& study, const std::string& folder,

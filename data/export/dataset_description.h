@@ -84,11 +84,9 @@ inline constexpr const char* kGuardSentence =
 /// JSON as the text of a file. Invalid UTF-8 is replaced.
 std::string json_text(const nlohmann::ordered_json& json);
 
-/// Internal to data/export: a table that explains the columns of trials.csv and attempts.csv.
-/// RFC 4180 with the header table,column,unit,value,meaning: a row for each column, followed by one
-/// for each of its codes or fault bits.
-void write_codebook(TextSink& out, const ProtocolFacts& facts, const ExportSettings& settings,
-                    const ExportClock& clock);
+/// Internal to data/export: the codebook of trials.csv and attempts.csv (csv.h), with its header.
+std::vector<CodebookRow> codebook_rows(const ProtocolFacts& facts, const ExportSettings& settings,
+                                       const ExportClock& clock);
 
 // Internal to data/export: the common part of BIDS and Psych-DS: a folder of tables that appears
 // complete or not at all and is recorded in the database.

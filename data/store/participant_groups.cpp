@@ -6,8 +6,8 @@
 
 namespace palpate::data {
 
-ParticipantGroups::ParticipantGroups(Store& store) {
-  for (const ProtocolInfo& protocol : store.protocols()) {
+ParticipantGroups::ParticipantGroups(const std::vector<ProtocolInfo>& protocols) {
+  for (const ProtocolInfo& protocol : protocols) {
     GroupAssignment groups = read_stored_protocol(protocol.text).groups;
     for (const std::string& name : groups.names) {
       if (std::ranges::find(names_, name) == names_.end()) names_.push_back(name);

@@ -13,7 +13,8 @@ namespace palpate::data {
 class ParticipantGroups {
  public:
   ParticipantGroups() = default;
-  explicit ParticipantGroups(Store& store);
+  explicit ParticipantGroups(Store& store) : ParticipantGroups(store.protocols()) {}
+  explicit ParticipantGroups(const std::vector<ProtocolInfo>& protocols);
 
   /// Whether any protocol of the database has groups.
   bool any() const { return !by_protocol_.empty(); }

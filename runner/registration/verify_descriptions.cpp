@@ -1,62 +1,42 @@
 #include "runner/registration/verify_descriptions.h"
 
-#include <stdlib.h>
-
 #include <algorithm>
 #include <filesystem>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <system_error>
-#include <tuple>
+#include <set>
+#include <stdexcept>
+#include <utility>
 
 #include "data/base/json_text.h"
 #include "data/export/csv.h"
-#include "data/store/store.h"
 #include "runner/registration/sealed_folder.h"
 #include "runner/study/export_settings.h"
-#include "runner/usage_error.h"
 
 namespace palpate::runner::registration {
 namespace {
 
 namespace fs = std::filesystem;
-using PlainJson = nlohmann::json;
 
 constexpr const char* kCodebook = "data/codebook.csv";
+constexpr const char* kOtherwise = " is described in another way than by the protocols";
 // Their rows follow from the sessions, not from the protocols.
 constexpr const char* kOfSessions = "torque_driven";
 
-/// A folder that is removed with what is in it.
-class Scratch {
- public:
-  Scratch() : path_((fs::temp_directory_path() / "palpate-verify-XXXXXX").string()) {
-    if (::mkdtemp(path_.data()) == nullptr)
-      throw UsageError(path_ + ": no folder can be made here for the comparison; set TMPDIR");
-  }
-  ~Scratch() {
-    std::error_code ignored;
-    fs::remove_all(path_, ignored);
-  }
-  Scratch(const Scratch&) = delete;
-  Scratch& operator=(const Scratch&) = delete;
-  std::string file(const char* name) const { return (fs::path(path_) / name).string(); }
-
- private:
-  std::string path_;
-};
-
-/// The codebook as an export makes it of a database with these protocols.
+/// The codebook as an export makes it for these protocols.
 TextTable codebook_of(const std::vector<analysis::ProtocolText>& protocols) {
-  const Scratch scratch;
-  const std::string path = scratch.file("codebook.csv");
   data::ExportSettings settings = study::export_settings();
   settings.times = data::Times::relative;
-  data::Store store =
-      data::Store::open(scratch.file("protocols.db"), data::Store::Mode::write_or_create);
+  std::vector<data::ProtocolInfo> infos;
+  infos.reserve(protocols.size());
   for (const analysis::ProtocolText& one : protocols)
-    store.enrol({one.name, one.text, one.sha256}, "P1", std::nullopt, true);
-  data::export_codebook(store, path, settings);
-  return read_text_table(path);
+    infos.push_back({one.name, one.text, one.sha256});
+  TextTable out;
+  for (const data::CodebookRow& row : data::codebook_of(infos, settings))
+    out.rows.emplace_back(row.begin(), row.end());
+  out.header = std::move(out.rows.front());
+  out.rows.erase(out.rows.begin());
+  return out;
 }
 
 /// Of a column of a table: its unit, its description, and the meanings of its values.
@@ -117,48 +97,62 @@ bool says_values(const std::string& text, const Described& described) {
   });
 }
 
+/// A text of an object; "": there is none.
+std::string text_of(const nlohmann::json& object, const char* key) {
+  const auto at = object.find(key);
+  return at == object.end() || !at->is_string() ? "" : at->get<std::string>();
+}
+
 /// variableMeasured of Psych-DS: one for each name, in the words of any of the tables.
-void compare_variables(const PlainJson& json, const std::string& file, const Codebook& made,
+void compare_variables(const nlohmann::json& json, const std::string& file, const Codebook& made,
                        std::vector<std::string>& faults) {
-  const PlainJson list =
-      json.is_object() ? json.value("variableMeasured", PlainJson()) : PlainJson();
-  if (!list.is_array()) return faults.push_back(file + ": has no variableMeasured");
-  for (const PlainJson& one : list) {
-    if (!one.is_object() || !one.contains("name") || !one["name"].is_string()) continue;
-    const std::string name = one["name"];
-    const std::string text = one.value("description", ""), unit = one.value("unitText", "");
+  if (!json.is_object() || !json.contains("variableMeasured") ||
+      !json["variableMeasured"].is_array())
+    return faults.push_back(file + ": has no list variableMeasured");
+  std::set<std::string> names;
+  for (const nlohmann::json& one : json["variableMeasured"]) {
+    const std::string name = one.is_object() ? text_of(one, "name") : "";
+    if (!names.insert(name).second) faults.push_back(file + ": describes " + name + " twice");
     bool known = false, fits = false;
     for (const auto& [key, described] : made) {
-      if (key.second != name || key.first == "pages") continue;
+      if (key.second != name) continue;
       known = true;
-      fits |= text.starts_with(described.description) && unit == described.unit &&
-              says_values(text, described);
+      const std::string text = text_of(one, "description");
+      fits |= text.starts_with(described.description) &&
+              text_of(one, "unitText") == described.unit && says_values(text, described);
     }
-    if (known && !fits)
-      faults.push_back(file + ": " + name + " is described in another way than by the protocols");
+    if (known && !fits) faults.push_back(file + ": " + name + kOtherwise);
   }
+  for (const auto& [key, described] : made)
+    if (key.first == "trials" && !names.contains(key.second))
+      faults.push_back(file + ": does not describe " + key.second);
 }
 
 /// A sidecar of BIDS: {"column": {"Description": ..., "Units": ..., "Levels": ...}}.
-void compare_sidecar(const PlainJson& json, const std::string& file, const Codebook& made,
-                     std::vector<std::string>& faults) {
+/// \param one_protocol  the codebook is of the sidecar's protocol alone
+void compare_sidecar(const nlohmann::json& json, const std::string& file, const Codebook& made,
+                     bool one_protocol, std::vector<std::string>& faults) {
   if (!json.is_object()) return faults.push_back(file + ": is no object");
   for (const auto& [key, described] : made) {
-    if (key.first != "trials" || !json.contains(key.second)) continue;
-    const PlainJson& one = json[key.second];
-    const bool same_words = one.is_object() &&
-                            one.value("Description", PlainJson()) == described.description &&
-                            one.value("Units", "") == described.unit;
-    const PlainJson levels =
-        one.is_object() ? one.value("Levels", one.value("Bits", PlainJson::object())) : PlainJson();
-    // A sidecar is of one protocol, the codebook of all; what a run was made with is added there.
-    const bool same_values = std::ranges::all_of(levels.items(), [&](const auto& level) {
-      const auto at = described.values.find(level.key());
-      return at == described.values.end() || level.value() == at->second;
-    });
-    if (!same_words || !same_values)
-      faults.push_back(file + ": " + key.second +
-                       " is described in another way than by the protocols");
+    // Of a column of another protocol it says nothing.
+    const auto at = key.first == "trials" ? json.find(key.second) : json.end();
+    if (at == json.end()) continue;
+    bool fits = at->is_object() && text_of(*at, "Description") == described.description &&
+                text_of(*at, "Units") == described.unit;
+    std::size_t explained = 0;
+    for (const char* const values : {"Levels", "Bits"}) {
+      if (!fits || !at->contains(values)) continue;
+      const nlohmann::json& levels = (*at)[values];
+      fits = levels.is_object();
+      for (const auto& [value, meaning] : levels.items()) {
+        const auto known = described.values.find(value);  // none: what sessions were run with
+        if (known == described.values.end()) continue;
+        fits &= meaning == known->second;
+        ++explained;
+      }
+    }
+    if (one_protocol) fits &= explained == described.values.size();
+    if (!fits) faults.push_back(file + ": " + key.second + kOtherwise);
   }
 }
 
@@ -167,13 +161,19 @@ void compare_sidecar(const PlainJson& json, const std::string& file, const Codeb
 std::vector<std::string> description_faults(const std::string& folder, const BundleFacts& facts) {
   std::vector<std::string> faults;
   const Codebook made = read_codebook(codebook_of(facts.record.protocols), faults);
-  const std::string path = (fs::path(folder) / kCodebook).string();
-  read_member(folder, kCodebook);  // refuses links
-  compare_codebooks(read_codebook(read_text_table(path), faults), made, faults);
+  try {
+    read_member(folder, kCodebook);  // refuses links
+    const TextTable stored = read_text_table((fs::path(folder) / kCodebook).string());
+    compare_codebooks(read_codebook(stored, faults), made, faults);
+  } catch (const std::runtime_error& error) {  // UsageError and InputError, too
+    faults.emplace_back(error.what());
+  }
+  const bool one_protocol = facts.record.protocols.size() == 1;
   for (const std::string& name : files_below(folder)) {
     if (!name.starts_with("data/" + facts.format + "/")) continue;
     if (name.ends_with("_beh.json"))
-      compare_sidecar(json_or_discarded(read_member(folder, name)), name, made, faults);
+      compare_sidecar(json_or_discarded(read_member(folder, name)), name, made, one_protocol,
+                      faults);
     if (facts.format == "psych-ds" && name.ends_with("/dataset_description.json"))
       compare_variables(json_or_discarded(read_member(folder, name)), name, made, faults);
   }
