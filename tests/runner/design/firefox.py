@@ -18,7 +18,7 @@ KEYS = {"Tab": "\ue004", "Enter": "\ue007", "Escape": "\ue00c", "End": "\ue010",
 # Nothing of the browser's own comes over the network or between the tests and the page.
 PREFERENCES = {"app.update.enabled": False, "browser.shell.checkDefaultBrowser": False, "browser.startup.page": 0, "datareporting.policy.dataSubmissionEnabled": False,
                "dom.disable_beforeunload": True, "network.captive-portal-service.enabled": False, "network.connectivity-service.enabled": False,
-               "network.dns.localDomains": "", "network.proxy.type": 0, "remote.prefs.recommended": True, "webgl.force-enabled": True}
+               "webgl.force-enabled": True}
 
 
 def find():
