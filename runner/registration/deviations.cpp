@@ -343,7 +343,7 @@ CheckPoint of_looks(const Registration& registered, const StudyData& study) {
                    std::to_string(looks.size()) + ", as registered: alpha is " +
                    analysis::short_number(at->alpha) + " at this look.";
     if (at + 1 != looks.end())
-      out.sentence += " Whether the study ends here is what the registration says of its end.";
+      out.sentence += " The registration says whether the study ends here.";
   }
   for (const analysis::Look& look : looks)
     out.evidence.push_back(std::to_string(look.participants) + " participants: alpha " +
