@@ -56,12 +56,13 @@ HYPOTHESES = {
 
 
 class Study(CommandCase):
-    """The studies are registered once for all tests; each gets copies."""
+    """The studies are registered once for all tests of all classes; each test gets copies."""
+    made = tempfile.TemporaryDirectory()
 
     def study(self, name):
         """Writes protocol, plan, hypotheses, registration and database of a study into the test's folder."""
         participants = PARTICIPANTS[name]
-        kept = self.base / name
+        kept = pathlib.Path(self.made.name) / name
         if not kept.exists():
             kept.mkdir()
             (kept / "p.json").write_text(json.dumps(PROTOCOLS[name]))
@@ -74,13 +75,6 @@ class Study(CommandCase):
             self.palpate("simulate", kept / "p.json", "--db", kept / "study.db", "--participants", participants)
         shutil.copytree(kept, self.dir / name)
         return self.dir / name
-
-    @classmethod
-    def setUpClass(cls):
-        super().setUpClass()
-        scratch = tempfile.TemporaryDirectory()
-        cls.addClassCleanup(scratch.cleanup)
-        cls.base = pathlib.Path(scratch.name)
 
     def points(self, study, *more, status=0, database="study.db"):
         self.palpate("check", study / "registration", "--db", study / database, "--json", study / "check.json", "--force",
