@@ -70,7 +70,9 @@ std::optional<analysis::Spending> spending_of(const std::string& name);
 double alpha_at(const Registration& registration, std::size_t participants);
 
 /// The fewest and most participants of a registration.
-inline constexpr std::size_t kFewestParticipants = 2, kMostParticipants = 10'000, kMostLooks = 20;
+inline constexpr std::size_t kFewestParticipants = 2, kMostParticipants = 10'000;
+/// The most looks at a study, its end among them.
+inline constexpr std::size_t kMostLooks = 20;
 /// s, largest limit of too fast answers.
 inline constexpr double kMostTooFast = 60;
 
