@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <boost/random/sobol.hpp>
 #include <charconv>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -13,30 +12,18 @@
 
 #include "data/base/json_text.h"
 #include "data/base/random.h"
+#include "data/base/sobol.h"
 #include "data/base/text.h"
 #include "protocols/json_document.h"
 #include "runner/participants/simulated_settings.h"
 
 namespace palpate::runner::sweep {
 
-std::vector<std::uint64_t> sobol_digits(std::uint64_t index, std::size_t dimensions) {
-  if (dimensions < 1 || dimensions > kMostSobolDimensions) {
-    throw std::invalid_argument("Sobol's sequence has 1 to " +
-                                std::to_string(kMostSobolDimensions) + " dimensions here, not " +
-                                std::to_string(dimensions));
-  }
-  std::vector<std::uint64_t> out(dimensions, 0);
-  if (index == 0) return out;  // Boost leaves the origin out
-  boost::random::sobol engine(dimensions);
-  engine.seed(index - 1);
-  for (std::uint64_t& digits : out) digits = engine();
-  return out;
-}
-
 namespace {
 
 // What a stream of the sweep's seed is for.
-enum Use : std::uint64_t { kPermutation = 1, kPlaceWithin = 2, kShift = 3 };
+// Sobol's shift has 3 (data/base/sobol.cpp).
+enum Use : std::uint64_t { kPermutation = 1, kPlaceWithin = 2 };
 
 /// As even as `wanted` allows, the first parameters first; choices have one for each value.
 std::vector<std::int64_t> grid_levels(const std::vector<protocols::SweepParameter>& parameters,
@@ -63,10 +50,6 @@ std::vector<std::int64_t> grid_levels(const std::vector<protocols::SweepParamete
     }
   }
   return levels;
-}
-
-double share_of_digits(std::uint64_t digits) {
-  return static_cast<double>(digits >> 11U) * 0x1p-53;  // the last digits that a double keeps
 }
 
 }  // namespace
@@ -115,16 +98,6 @@ Design::Design(DesignKind kind, std::int64_t wanted, std::uint64_t seed,
   }
 }
 
-std::vector<double> Design::sobol(std::uint64_t index, std::size_t dimensions) const {
-  std::vector<double> out;
-  const std::vector<std::uint64_t> digits = sobol_digits(index, dimensions);
-  for (std::size_t d = 0; d < dimensions; ++d) {
-    const std::uint64_t shift = Random(seed_, {kShift, d}).next();
-    out.push_back(share_of_digits(digits[d] ^ shift));
-  }
-  return out;
-}
-
 std::vector<double> Design::at(std::int64_t point) const {
   if (point < 1 || point > size_) throw std::out_of_range("a design has no such point");
   const auto index = static_cast<std::uint64_t>(point - 1);
@@ -140,7 +113,7 @@ std::vector<double> Design::at(std::int64_t point) const {
       }
       break;
     case DesignKind::sobol:
-      return sobol(index, dimensions_);
+      return shifted_sobol(index, dimensions_, seed_);
     case DesignKind::grid: {
       std::uint64_t rest = index;
       for (std::size_t d = 0; d < dimensions_; ++d) {
@@ -153,7 +126,7 @@ std::vector<double> Design::at(std::int64_t point) const {
     }
     case DesignKind::saltelli: {
       const std::uint64_t each = dimensions_ + 2, role = index % each;
-      const std::vector<double> both = sobol(index / each, 2 * dimensions_);
+      const std::vector<double> both = shifted_sobol(index / each, 2 * dimensions_, seed_);
       for (std::size_t d = 0; d < dimensions_; ++d) {
         const bool from_b = role == 1 || role == 2 + d;
         out.push_back(both[from_b ? dimensions_ + d : d]);

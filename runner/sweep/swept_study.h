@@ -19,14 +19,6 @@ namespace palpate::runner::sweep {
 // Where in the unit cube the points of a sweep lie. A point follows from the design, the seed and
 // its number alone, so that any machine can compute any of them.
 
-constexpr std::size_t kMostSobolDimensions = 3667;
-
-/// Point `index` (from 0: the origin) of Sobol's sequence in [0, 1)^dimensions, as 64 binary digits
-/// each, in the order of Antonov & Saleev (1979) with the direction numbers new-joe-kuo-6.21201
-/// (Joe & Kuo 2008), which Boost.Random brings. \throws std::invalid_argument: no dimension, or
-/// more than kMostSobolDimensions
-std::vector<std::uint64_t> sobol_digits(std::uint64_t index, std::size_t dimensions);
-
 enum class DesignKind {
   lhs,  ///< Latin hypercube (McKay, Beckman & Conover 1979): of every parameter, one point in each
         ///< of as many equally likely parts as there are points
@@ -52,8 +44,6 @@ class Design {
   std::vector<double> at(std::int64_t point) const;
 
  private:
-  std::vector<double> sobol(std::uint64_t index, std::size_t dimensions) const;
-
   DesignKind kind_;
   std::uint64_t seed_;
   std::size_t dimensions_;
