@@ -14,6 +14,7 @@
 #include "data/base/cell_name.h"
 #include "data/base/column_names.h"
 #include "data/base/json_text.h"
+#include "protocols/tasks/levels.h"
 #include "protocols/tasks/parse_blocks.h"
 
 namespace palpate::protocols {
@@ -380,8 +381,10 @@ void Cells::check_sets(const TaskBlock& block) {
         tell(sets[i].place,
              std::string("expected another key: all cells share '") + (key + 1) + "'");
     }
-    if (!target.stimulus.empty() && block.level &&
-        one_holds_the_other(target.rest, block.level->pointer))
+    const auto varies = [&](const LevelTarget& one) {
+      return one_holds_the_other(target.rest, one.pointer);
+    };
+    if (!target.stimulus.empty() && std::ranges::any_of(targets_of(block), varies))
       tell(sets[i].place,
            "expected another key: block '" + block.name + "' varies it as its level");
     if (target.stimulus.empty() || target.stimulus == "*") continue;

@@ -48,6 +48,26 @@ struct LevelTarget {
   bool orientation = false;  ///< pointer is "/orientation"
 };
 
+/// One of the numbers that are varied together, from trial to trial.
+struct LevelDimension {
+  /// The stimuli of a trial whose number it is.
+  enum class Of { comparison, standard, both };
+  std::string name;  ///< of its column
+  LevelTarget target;
+  Of of = Of::comparison;
+  LevelScale scale = LevelScale::linear;  ///< linear or log10
+
+  bool applies_to(bool standard) const {
+    return of == Of::both || (of == Of::standard) == standard;
+  }
+};
+
+/// "comparison", ...
+inline const char* to_string(LevelDimension::Of of) {
+  constexpr std::array kNames = {"comparison", "standard", "both"};
+  return kNames[static_cast<std::size_t>(of)];
+}
+
 /// The answer that a key gives.
 struct TaskAnswer {
   std::string key;    ///< as in the protocol
@@ -144,6 +164,7 @@ struct TaskBlock {
   /// Of a stimulus in a cell: `standard` and `absent` in the same cell.
   std::map<int, int> standard_of{}, absent_of{};
   std::optional<LevelTarget> level;
+  std::vector<LevelDimension> dimensions{};  ///< 2 to 4, in place of `level`; empty: none
   std::vector<ProcedureSpec> procedures;  ///< tracks for each stimulus and renderer; none: no level
   /// Of each stimulus and renderer, without procedure; external: trials of the block.
   int repetitions = 1;

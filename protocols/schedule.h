@@ -26,6 +26,8 @@ struct Interval {
   RendererKind renderer = RendererKind::point;
   std::optional<double> level = std::nullopt;  ///< none: the stimulus unchanged
   bool standard = false;                       ///< the other interval is compared with it
+  /// Of the block's dimensions, those of this interval and of others; empty: as for `level`.
+  LevelPoint point = {};
 };
 
 /// One scheduled presentation. Numbers count from 1; `trial` counts within the session.
@@ -42,6 +44,7 @@ struct Trial {
   bool catch_trial = false;
   std::vector<Interval> intervals = {};  ///< in order of presentation
   ReachTrial reach = ReachTrial::field;  ///< reach; `level` is the number of the target, from 1
+  LevelPoint point = {};  ///< of the block's dimensions; empty: none, or a catch trial
 };
 
 /// The block of a trial.

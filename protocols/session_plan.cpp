@@ -60,6 +60,7 @@ const TaskBlock& SessionPlan::block() const { return protocol_->blocks[block_ind
 
 void SessionPlan::begin_sequence() {
   shown_ = unanswered_ = 0;
+  ended_ = false;
   rounds_ = 0;
   right_.clear();
   fixed_.clear();
@@ -96,7 +97,8 @@ void SessionPlan::add_round() {
 }
 
 bool SessionPlan::sequence_continues() {
-  if (tracks_) return tracks_->next().has_value() && unanswered_ < most_unanswered(block());
+  if (tracks_)
+    return !ended_ && tracks_->next().has_value() && unanswered_ < most_unanswered(block());
   const bool round_ends = shown_ == fixed_.size();
   if (!criterion_ || (criterion_->by_round && !round_ends)) return !round_ends;
   if (shown_ >= static_cast<std::size_t>(criterion_->most_trials) || criterion_met()) return false;
@@ -118,7 +120,8 @@ Trial SessionPlan::adaptive_trial() const {
   trial.stimulus = track.stimulus;
   trial.renderer = track.renderer;
   trial.track = first_track(block()) + static_cast<int>(wanted.track);
-  trial.level = wanted.level;
+  if (wanted.point.empty()) trial.level = wanted.level;
+  trial.point = wanted.point;
   const DrawnTrial drawn = drawn_trial(*protocol_, participant_number_, sequence().block, shown_);
   trial.catch_trial = drawn.catch_trial;
   set_intervals(block(), drawn.position, trial);
@@ -151,6 +154,18 @@ void SessionPlan::propose(double level) {
   }
 }
 
+void SessionPlan::propose(const LevelPoint& point) {
+  next_->point = point;
+  for (Interval& interval : next_->intervals) {
+    if (!interval.point.empty()) interval.point = point;
+  }
+}
+
+void SessionPlan::end_block() {
+  ended_ = true;
+  find_next();
+}
+
 void SessionPlan::choose(const TrialChoice& choice) {
   next_->stimulus = choice.stimulus;
   next_->renderer = choice.renderer;
@@ -165,11 +180,17 @@ void SessionPlan::choose(const TrialChoice& choice) {
   if (!choice.intervals.empty()) next_->intervals = choice.intervals;
 }
 
+void SessionPlan::continue_in(int block) {
+  while (next_ && next_->block < block && tracks_) end_block();
+}
+
 void SessionPlan::answered(const TrialOutcome& outcome) {
+  continue_in(outcome.block);
   after_practice_ = next_->practice;
   if (tracks_ && !outcome.answered) ++unanswered_;
   if (tracks_ && outcome.answered && !next_->catch_trial)
-    tracks_->record({outcome.level.value_or(*next_->level), outcome.success});
+    tracks_->record({outcome.level.value_or(next_->level.value_or(0)), outcome.success,
+                     outcome.point.empty() ? next_->point : outcome.point});
   right_.push_back(outcome.answered && outcome.correct);
   ++shown_;
   ++done_;

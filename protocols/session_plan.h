@@ -21,6 +21,10 @@ struct TrialOutcome {
   bool answered = true;  ///< false: a time-out; an adaptive level is repeated
   /// The level shown, if not the plan's; none: the plan's.
   std::optional<double> level = std::nullopt;
+  LevelPoint point = {};  ///< likewise, of several dimensions
+  /// Number of the block in which it was shown. If it is above that of the next trial, a program
+  /// ended the blocks before. 0: that of the next trial.
+  int block = 0;
 };
 
 /// The contents of a trial of an external block.
@@ -57,6 +61,14 @@ class SessionPlan {
   /// Shows the next trial at another level, which the procedure records with the answer.
   /// \pre it belongs to an adaptive block and is not a catch trial
   void propose(double level);
+  /// The same of a point. \pre the block's levels have several dimensions
+  void propose(const LevelPoint& point);
+  /// Ends the block of the next trial before it: a program has enough.
+  /// \pre it is adaptive
+  void end_block();
+  /// Ends adaptive blocks until the next trial is in a block of this number, or in one that does
+  /// not end so.
+  void continue_in(int block);
   /// Sets the next trial as another program chose it.
   /// \pre it belongs to an external block
   void choose(const TrialChoice& choice);
@@ -94,6 +106,7 @@ class SessionPlan {
   std::size_t at_ = 0;                ///< into sequences_
   std::size_t done_ = 0, shown_ = 0;  ///< in the session, in the sequence
   std::size_t unanswered_ = 0;        ///< in an adaptive block
+  bool ended_ = false;                ///< likewise, before its procedures have
   std::vector<Trial> fixed_;          ///< of the sequence as far as known; empty: adaptive
   std::uint64_t rounds_ = 0;          ///< in fixed_; more than one if practice continues
   std::optional<PracticeCriterion> criterion_;  ///< of the sequence

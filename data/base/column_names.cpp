@@ -33,7 +33,6 @@ constexpr std::array kColumnNames = std::to_array<std::string_view>({"adaptation
                                                                      "body_z",
                                                                      "buttons",
                                                                      "catch_trial",
-                                                                     "comparison",
                                                                      "comparison_interval",
                                                                      "compute",
                                                                      "confidence",

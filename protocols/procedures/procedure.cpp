@@ -19,7 +19,16 @@ ConstantStimuliRun::ConstantStimuliRun(const ConstantStimuli& spec, std::uint64_
     std::vector<double> levels = spec.levels;
     random.shuffle(levels);
     order_.insert(order_.end(), levels.begin(), levels.end());
+    if (spec.points.empty()) continue;
+    std::vector<LevelPoint> points = spec.points;
+    random.shuffle(points);
+    points_.insert(points_.end(), points.begin(), points.end());
   }
+}
+
+std::optional<LevelPoint> ConstantStimuliRun::next_point() const {
+  if (trials_ >= points_.size()) return std::nullopt;
+  return points_[trials_];
 }
 
 std::optional<double> ConstantStimuliRun::next_level() const {
@@ -188,13 +197,6 @@ struct QuestPlusTables {
 
 namespace {
 
-constexpr double kTieBits = 1e-10;
-constexpr double kLn2 = 0.69314718055994531;
-
-double plogp(double p) { return p > 0 ? p * portable_log(p) : 0; }
-
-double answer_entropy(double p) { return -plogp(p) - plogp(1 - p); }
-
 std::vector<double> cores_at(const QuestPlus& spec, double level) {
   std::vector<double> core;
   core.reserve(spec.threshold.values.size() * spec.slope.values.size());
@@ -295,7 +297,7 @@ std::vector<double> QuestPlusRun::expected_information() const {
 
 double QuestPlusRun::entropy_bits() const {
   double sum = 0;
-  for (const double p : posterior_) sum -= plogp(p);
+  for (const double p : posterior_) sum -= portable_plogp(p);
   return sum / kLn2;
 }
 
@@ -369,7 +371,8 @@ Estimate QuestPlusRun::estimate() const {
 
 namespace {
 
-using Run = std::variant<ConstantStimuliRun, StaircaseRun, QuestPlusRun, LimitsRun, AskedRun>;
+using Run = std::variant<ConstantStimuliRun, StaircaseRun, QuestPlusRun, LimitsRun, AskedRun,
+                         SobolRun, FieldQuestPlusRun>;
 
 Run begin_run(const ProcedureSpec& spec, std::uint64_t seed) {
   if (const auto* constant = std::get_if<ConstantStimuli>(&spec))
@@ -377,21 +380,24 @@ Run begin_run(const ProcedureSpec& spec, std::uint64_t seed) {
   if (const auto* staircase = std::get_if<Staircase>(&spec)) return StaircaseRun(*staircase);
   if (const auto* quest = std::get_if<QuestPlus>(&spec)) return QuestPlusRun(*quest);
   if (const auto* limits = std::get_if<Limits>(&spec)) return LimitsRun(*limits, seed);
-  return AskedRun(std::get<Asked>(spec), seed);
-}
-
-bool is_same(const ParameterGrid& a, const ParameterGrid& b) {
-  return a.values == b.values && a.weights == b.weights;
+  if (const auto* asked = std::get_if<Asked>(&spec)) return AskedRun(*asked, seed);
+  if (const auto* sobol = std::get_if<SobolPoints>(&spec)) return SobolRun(*sobol, seed);
+  if (const auto* points = std::get_if<AskedPoints>(&spec)) return SobolRun(points->own, seed);
+  return FieldQuestPlusRun(std::get<FieldQuestPlus>(spec));
 }
 
 bool is_same_quest_plus(const ProcedureSpec& one, const ProcedureSpec& other) {
+  if (const auto* field = std::get_if<FieldQuestPlus>(&one)) {
+    const auto* same = std::get_if<FieldQuestPlus>(&other);
+    return same != nullptr && *field == *same;
+  }
   const auto *a = std::get_if<QuestPlus>(&one), *b = std::get_if<QuestPlus>(&other);
   if (a == nullptr || b == nullptr) return false;
   return a->function.shape == b->function.shape && a->function.scale == b->function.scale &&
          a->function.easier == b->function.easier && a->levels == b->levels &&
-         is_same(a->threshold, b->threshold) && is_same(a->slope, b->slope) &&
-         is_same(a->guess, b->guess) && is_same(a->lapse, b->lapse) &&
-         a->stop_trials == b->stop_trials && a->stop_entropy_bits == b->stop_entropy_bits;
+         a->threshold == b->threshold && a->slope == b->slope && a->guess == b->guess &&
+         a->lapse == b->lapse && a->stop_trials == b->stop_trials &&
+         a->stop_entropy_bits == b->stop_entropy_bits;
 }
 
 }  // namespace
@@ -399,7 +405,21 @@ bool is_same_quest_plus(const ProcedureSpec& one, const ProcedureSpec& other) {
 Procedure::Procedure(const ProcedureSpec& spec, std::uint64_t seed) : run_(begin_run(spec, seed)) {}
 
 std::optional<double> Procedure::next_level() const {
-  return std::visit([](const auto& run) { return run.next_level(); }, run_);
+  return std::visit(
+      [](const auto& run) -> std::optional<double> {
+        if constexpr (requires { run.next_level(); }) return run.next_level();
+        return std::nullopt;
+      },
+      run_);
+}
+
+std::optional<LevelPoint> Procedure::next_point() const {
+  return std::visit(
+      [](const auto& run) -> std::optional<LevelPoint> {
+        if constexpr (requires { run.next_point(); }) return run.next_point();
+        return std::nullopt;
+      },
+      run_);
 }
 
 void Procedure::record(const Response& response) {
@@ -438,7 +458,7 @@ std::vector<std::size_t> round_of_tracks(std::uint64_t seed, std::uint64_t round
 void InterleavedTracks::begin_round() {
   std::vector<std::size_t> unfinished;
   for (std::size_t i = 0; i < tracks_.size(); ++i) {
-    if (tracks_[i].next_level()) unfinished.push_back(i);
+    if (!tracks_[i].ended()) unfinished.push_back(i);
   }
   round_ = round_of_tracks(seed_, rounds_++, std::move(unfinished));
   std::ranges::reverse(round_);
@@ -446,7 +466,9 @@ void InterleavedTracks::begin_round() {
 
 std::optional<TrackLevel> InterleavedTracks::next() const {
   if (round_.empty()) return std::nullopt;
-  return TrackLevel{round_.back(), *tracks_[round_.back()].next_level()};
+  const Procedure& track = tracks_[round_.back()];
+  if (auto point = track.next_point()) return TrackLevel{round_.back(), 0, std::move(*point)};
+  return TrackLevel{round_.back(), *track.next_level()};
 }
 
 void InterleavedTracks::record(const Response& response) {
@@ -519,7 +541,7 @@ std::optional<CourseParticipant> course_participant(const ProcedureSpec& spec,
 }  // namespace
 
 double expected_trials(const ProcedureSpec& spec, const Procedure& so_far) {
-  if (!so_far.next_level()) return 0;
+  if (so_far.ended()) return 0;
   const double done = so_far.estimate().trials;
   const auto participant = course_participant(spec, so_far);
   if (!participant) return static_cast<double>(most_trials(spec)) - done;

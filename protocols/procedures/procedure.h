@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -16,8 +17,9 @@ namespace palpate::protocols {
 
 /// One answered trial.
 struct Response {
-  double level = 0;      ///< as it was shown
-  bool success = false;  ///< correct (forced choice), or "yes"
+  double level = 0;       ///< as it was shown
+  bool success = false;   ///< correct (forced choice), or "yes"
+  LevelPoint point = {};  ///< of several dimensions, in place of `level`
 };
 
 /// The estimates from the answers so far; nullopt if a procedure does not estimate the value.
@@ -30,6 +32,8 @@ struct Estimate {
   /// Trials at an end of the range (Staircase), series without a change (Limits): many of them mean
   /// that the threshold lies outside the range.
   int at_limit = 0;
+  /// FieldQuestPlus: means of the posterior, as grid_names.
+  std::vector<double> parameters = {};
 };
 
 class ConstantStimuliRun {
@@ -37,11 +41,13 @@ class ConstantStimuliRun {
   ConstantStimuliRun(const ConstantStimuli& spec, std::uint64_t seed);
 
   std::optional<double> next_level() const;
+  std::optional<LevelPoint> next_point() const;
   void record(const Response& response);
   Estimate estimate() const;  ///< counts only: the analysis estimates the threshold
 
  private:
   std::vector<double> order_;
+  std::vector<LevelPoint> points_;
   std::size_t trials_ = 0;
 };
 
@@ -110,6 +116,9 @@ class AskedRun {
   int trials_ = 0;
 };
 
+/// Levels of QUEST+ whose expected information differs by less are equally good.
+inline constexpr double kTieBits = 1e-10;
+
 struct QuestPlusTables;
 
 /// Watson 2017, "QUEST+: A general multidimensional Bayesian adaptive psychometric method".
@@ -140,6 +149,54 @@ class QuestPlusRun {
   int trials_ = 0;
 };
 
+/// Levels do not follow from the answers.
+class SobolRun {
+ public:
+  SobolRun(SobolPoints spec, std::uint64_t seed) : spec_(std::move(spec)), seed_(seed) {}
+
+  std::optional<LevelPoint> next_point() const;
+  void record(const Response& response);
+  Estimate estimate() const;  ///< counts only
+
+ private:
+  SobolPoints spec_;
+  std::uint64_t seed_;
+  int trials_ = 0;
+};
+
+struct FieldQuestPlusTables;
+
+/// Watson 2017, as QuestPlusRun, over points of several dimensions. Parameters that are not of
+/// interest are summed over: the expected entropy is that of the others' marginal posterior. Ties
+/// within 1e-10 bit go to the first point. Probabilities are tabulated once, in single precision,
+/// for all copies of a run.
+class FieldQuestPlusRun {
+ public:
+  explicit FieldQuestPlusRun(const FieldQuestPlus& spec);
+
+  std::optional<LevelPoint> next_point() const;
+  /// A point off the grid counts at its true place.
+  void record(const Response& response);
+  /// Means of the posterior.
+  Estimate estimate() const;
+
+  /// Expected information of an answer about the parameters of interest at each point, bit.
+  std::vector<double> expected_information() const;
+  double entropy_bits() const;  ///< of the posterior of all parameters
+  /// Posterior of all parameters, the last varying fastest.
+  const std::vector<double>& posterior() const { return posterior_; }
+  /// Posterior of one parameter, by its place in grid_names.
+  std::vector<double> marginal(std::size_t parameter) const;
+
+ private:
+  void find_next();
+
+  std::shared_ptr<const FieldQuestPlusTables> tables_;
+  std::vector<double> posterior_;
+  std::optional<std::size_t> next_;  ///< index of the point
+  int trials_ = 0;
+};
+
 /// A procedure and the answers to it. Copies are independent. A resumed session records its answers
 /// again, one by one.
 class Procedure {
@@ -147,14 +204,20 @@ class Procedure {
   /// \param spec  as checked by the parser
   Procedure(const ProcedureSpec& spec, std::uint64_t seed);
 
-  std::optional<double> next_level() const;  ///< nullopt: the procedure has ended
+  /// nullopt: the procedure has ended, or its levels have several dimensions
+  std::optional<double> next_level() const;
+  /// nullopt: the procedure has ended, or its levels have one dimension
+  std::optional<LevelPoint> next_point() const;
+  bool ended() const { return !next_level() && !next_point(); }
   /// Do not record an unanswered trial: its level is repeated.
   void record(const Response& response);
   Estimate estimate() const;
   const std::vector<Response>& history() const { return history_; }
 
  private:
-  std::variant<ConstantStimuliRun, StaircaseRun, QuestPlusRun, LimitsRun, AskedRun> run_;
+  std::variant<ConstantStimuliRun, StaircaseRun, QuestPlusRun, LimitsRun, AskedRun, SobolRun,
+               FieldQuestPlusRun>
+      run_;
   std::vector<Response> history_;
 };
 
@@ -162,6 +225,7 @@ class Procedure {
 struct TrackLevel {
   std::size_t track = 0;
   double level = 0;
+  LevelPoint point = {};  ///< of several dimensions, in place of `level`
 };
 
 /// The order of a round's tracks: every unfinished one, shuffled.

@@ -4,10 +4,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <variant>
 #include <vector>
 
 #include "data/base/random.h"
+#include "protocols/procedures/field_function.h"
 #include "protocols/procedures/psychometric.h"
 
 namespace palpate::protocols {
@@ -23,6 +25,7 @@ inline std::uint64_t track_seed(std::uint64_t seed, std::size_t track) {
 struct ConstantStimuli {
   std::vector<double> levels;
   int repetitions = 1;
+  std::vector<LevelPoint> points = {};  ///< of several dimensions, in place of `levels`
 };
 
 /// Up-down staircase: `down` successes in a row make it harder by a step, `up` failures in a row
@@ -51,6 +54,8 @@ double step_ratio_for(double target, int down);
 struct ParameterGrid {
   std::vector<double> values;
   std::vector<double> weights;  ///< > 0; empty: equally likely
+
+  bool operator==(const ParameterGrid&) const = default;
 };
 
 /// QUEST+ (Watson 2017): chooses the level with the smallest expected entropy of the parameters.
@@ -82,7 +87,46 @@ struct Asked {
   int stop_trials = 60;
 };
 
-using ProcedureSpec = std::variant<ConstantStimuli, Staircase, QuestPlus, Limits, Asked>;
+/// The range of a dimension.
+struct DimensionRange {
+  double min = 0, max = 1;
+  LevelScale scale = LevelScale::linear;  ///< on which points lie evenly
+};
+
+/// Points of Sobol's sequence, shifted by the seed: they fill the ranges evenly, however many there
+/// are.
+struct SobolPoints {
+  std::vector<DimensionRange> ranges;  ///< of the dimensions, in their order
+  int trials = 60;
+};
+
+/// A program chooses every point, within the ranges. Where it does not answer, points are `own`.
+struct AskedPoints {
+  SobolPoints own;
+};
+
+/// QUEST+ over points of several dimensions: chooses the point with the smallest expected entropy
+/// of the parameters of interest.
+struct FieldQuestPlus {
+  FieldFunction function;
+  std::vector<std::vector<double>> levels;  ///< of each dimension; points are their product
+  /// Of the form's parameters in their order, then guess (unless the form has two lapses) and
+  /// lapse.
+  std::vector<ParameterGrid> parameters;
+  std::vector<bool> interest;  ///< of each of these
+  int stop_trials = 60;
+  std::optional<double> stop_entropy_bits;  ///< of the posterior of all parameters
+
+  bool operator==(const FieldQuestPlus&) const = default;
+};
+
+/// Names of `parameters`: "w", "c", "lapse".
+std::vector<std::string> grid_names(FieldForm form);
+/// All combinations of values, the last dimension varying fastest.
+std::vector<LevelPoint> product_of(const std::vector<std::vector<double>>& levels);
+
+using ProcedureSpec = std::variant<ConstantStimuli, Staircase, QuestPlus, Limits, Asked,
+                                   SobolPoints, AskedPoints, FieldQuestPlus>;
 
 /// "constant", "staircase", ...: as a protocol names it.
 const char* kind_of(const ProcedureSpec& spec);
@@ -91,9 +135,18 @@ std::optional<LevelScale> scale_of(const ProcedureSpec& spec);
 /// The levels that are easier; nullopt: constant stimuli do not say.
 std::optional<Easier> easier_of(const ProcedureSpec& spec);
 
+/// Whether a program chooses every level.
+bool is_asked(const ProcedureSpec& spec);
+
 /// Levels that a procedure may request: all of them, or (Staircase) its start and the ends of its
 /// range. Refuse a stimulus that a device cannot show at one of these before the first trial.
 std::vector<double> levels_to_check(const ProcedureSpec& spec);
+/// The same of points: all of them, or (ranges, and grids of more than kMostCheckedPoints) the
+/// corners of their range. Empty: levels have one dimension.
+std::vector<LevelPoint> points_to_check(const ProcedureSpec& spec);
+inline constexpr std::size_t kMostCheckedPoints = 1000;
+/// The least and most value of each dimension; empty: levels have one.
+std::vector<DimensionRange> ranges_of(const ProcedureSpec& spec);
 /// Upper limit on the trials of a procedure.
 std::size_t most_trials(const ProcedureSpec& spec);
 

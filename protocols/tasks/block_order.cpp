@@ -129,9 +129,8 @@ bool is_adaptive(const TaskBlock& block) {
 }
 
 const TaskBlock* block_that_asks(const Protocol& protocol) {
-  const auto asks = [](const ProcedureSpec& spec) { return std::holds_alternative<Asked>(spec); };
   const auto found = std::ranges::find_if(protocol.blocks, [&](const TaskBlock& block) {
-    return std::ranges::any_of(block.procedures, asks);
+    return std::ranges::any_of(block.procedures, is_asked);
   });
   if (found != protocol.blocks.end()) return &*found;
   for (const auto& group : protocol.group_protocols) {

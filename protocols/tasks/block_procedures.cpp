@@ -57,7 +57,10 @@ std::map<std::string, BlockProcedures> procedures_of_blocks(const std::string& t
     BlockProcedures procedures;
     procedures.protocol_seed = seed;
     procedures.index = all.size();
-    read_procedures(block, procedures.specs);
+    std::optional<LevelTarget> number;
+    if (one.is_object() && one.contains(nlohmann::json::json_pointer("/level/dimensions")))
+      read_level(block, number, procedures.dimensions);
+    read_procedures(block, procedures.dimensions, procedures.specs);
     if (has_cells_apart(one))
       procedures.tracks_of_cell = count_of(one, "stimuli", 1) *
                                   count_of(one, "renderers", count_of(root, "renderers", 1)) *

@@ -14,12 +14,13 @@ namespace palpate::protocols {
 /// The procedures that chose a block's levels.
 struct BlockProcedures {
   std::uint64_t protocol_seed = 0;
-  std::uint64_t index = 0;                ///< of the block in its protocol
-  std::size_t tracks_of_cell = 0;         ///< of each cell that stands apart; 0: none does
-  std::vector<ProcedureSpec> specs;       ///< empty: none
-  bool asks_smaller = false;              ///< compare: the interval with the smaller level
-  std::string level_unit{};               ///< "N/m", ...; "1" without one, "": nothing is varied
-  std::vector<ScaleStep> rating_steps{};  ///< rate: of a labelled scale; empty: none
+  std::uint64_t index = 0;                   ///< of the block in its protocol
+  std::size_t tracks_of_cell = 0;            ///< of each cell that stands apart; 0: none does
+  std::vector<ProcedureSpec> specs;          ///< empty: none
+  bool asks_smaller = false;                 ///< compare: the interval with the smaller level
+  std::string level_unit{};                  ///< "N/m", ...; "1" without one, "": nothing is varied
+  std::vector<LevelDimension> dimensions{};  ///< of several; empty: the level is one number
+  std::vector<ScaleStep> rating_steps{};     ///< rate: of a labelled scale; empty: none
 
   /// The spec of a track, from 1.
   /// \pre specs is not empty

@@ -1,5 +1,6 @@
 #include "protocols/tasks/block_tracks.h"
 
+#include <algorithm>
 #include <cmath>
 #include <map>
 #include <utility>
@@ -62,9 +63,11 @@ long long with_catch_trials(const TaskBlock& block, long long trials) {
 }
 
 void set_intervals(const TaskBlock& block, int position, Trial& trial) {
-  const Interval asked{trial.stimulus, trial.renderer, trial.level};
-  const Interval standard{in_cell(block.standard_of, trial.stimulus, block.standard),
-                          block.standard_renderer.value_or(trial.renderer), std::nullopt, true};
+  const Interval asked{trial.stimulus, trial.renderer, trial.level, false, trial.point};
+  Interval standard{in_cell(block.standard_of, trial.stimulus, block.standard),
+                    block.standard_renderer.value_or(trial.renderer), std::nullopt, true};
+  if (std::ranges::any_of(block.dimensions, [](const auto& one) { return one.applies_to(true); }))
+    standard.point = trial.point;
   switch (block.task) {
     case TaskKind::identify:
     case TaskKind::external:
@@ -91,7 +94,9 @@ void set_intervals(const TaskBlock& block, int position, Trial& trial) {
       trial.intervals = {{felt_on_the_way(*block.reaching, trial), trial.renderer}};
       return;  // a catch trial has a target, too
   }
-  if (trial.catch_trial) trial.level.reset();
+  if (!trial.catch_trial) return;
+  trial.level.reset();
+  trial.point.clear();
 }
 
 }  // namespace palpate::protocols

@@ -64,6 +64,13 @@ void add_levels(const TaskBlock& block, const BlockTrack& track, Category catego
     return;
   }
   const auto& constant = std::get<ConstantStimuli>(*track.procedure);
+  for (const LevelPoint& point : constant.points) {
+    Category one = category;
+    one.name += " at " + point_text(block, point);
+    one.trial.point = point;
+    one.count = constant.repetitions;
+    categories.push_back(std::move(one));
+  }
   for (const double level : constant.levels) {
     Category one = category;
     one.name += " at " + level_text(level);

@@ -258,9 +258,34 @@ void check_levels_of(const Protocol& protocol, const TaskBlock& block, const std
   }
 }
 
+void check_points_of(const Protocol& protocol, const TaskBlock& block, const std::string& pointer,
+                     FaultList& faults) {
+  std::set<std::string> told;
+  check_points(
+      protocol, block,
+      [&](int stimulus, const LevelPoint& point, bool standard, const Fault& fault) {
+        const std::string& name = protocol.stimuli[static_cast<std::size_t>(stimulus)].name;
+        // Report each kind of fault for one point only.
+        if (!told.insert(name + fault.location).second) return;
+        const auto at_fault = std::ranges::find_if(block.dimensions, [&](const auto& one) {
+          return one.applies_to(standard) && fault.location.starts_with(one.target.pointer);
+        });
+        const std::string place = at_fault != block.dimensions.end()
+                                      ? "/level/dimensions/" +
+                                            std::to_string(at_fault - block.dimensions.begin()) +
+                                            "/path"
+                                      : "/level/dimensions";
+        faults.add(pointer + place, "expected levels that '" + name + "' can have: at " +
+                                        point_text(block, point) + ", " + fault.location + ": " +
+                                        fault.expected);
+      });
+}
+
 /// The levels with more successes in two intervals, which follow from the question.
 /// \return nullopt: the task does not determine them
 std::optional<Easier> expected_easier(const Protocol& protocol, const TaskBlock& block) {
+  if (block.task == TaskKind::compare && !block.same_different && !block.dimensions.empty())
+    return block.asks_smaller ? Easier::lower : Easier::higher;
   if (block.task != TaskKind::compare || block.same_different || block.intervals > 2)
     return std::nullopt;
   if (const int side = side_of_levels(protocol, block); side != 0)
@@ -272,7 +297,7 @@ std::optional<Easier> expected_easier(const Protocol& protocol, const TaskBlock&
 void check_easier(const Protocol& protocol, const TaskBlock& block, const std::string& pointer,
                   FaultList& faults) {
   const std::optional<Easier> expected =
-      block.level ? expected_easier(protocol, block) : std::nullopt;
+      block.level || !block.dimensions.empty() ? expected_easier(protocol, block) : std::nullopt;
   if (!expected) return;
   for (std::size_t i = 0; i < block.procedures.size(); ++i) {
     const std::optional<Easier> easier = easier_of(block.procedures[i]);
@@ -357,45 +382,19 @@ void read_block_renderers(ObjectReader& reader, const Protocol& protocol, TaskBl
   }
 }
 
-void read_level(ObjectReader& reader, TaskBlock& block) {
-  reader.section("level", [&](ObjectReader& level) {
-    LevelTarget target;
-    const json* const path = level.member("path", Presence::required);
-    const bool text = path != nullptr && path->is_string();
-    target.pointer = text ? path->get<std::string>() : "";
-    if (path != nullptr &&
-        (target.pointer.size() < 2 || target.pointer.front() != '/' || target.pointer == "/name")) {
-      level.faults().add(level.pointer("path"),
-                         "expected a JSON pointer to a number of the stimulus, such as "
-                         "'/stiffness_n_per_m' or '/layers/0/depth_m'" +
-                             found_text(*path));
-      target.pointer.clear();
-    }
-    target.orientation = target.pointer == "/orientation";
-    if (target.orientation) {
-      level.vector("axis", target.axis, {-1e3, 1e3}, Presence::required);
-      if (glm::length(target.axis) > 1e-9) {
-        target.axis = glm::normalize(target.axis);
-      } else if (level.has("axis")) {
-        level.faults().add(level.pointer("axis"), "expected an axis that is not zero");
-      }
-    }
-    if (!target.pointer.empty()) block.level = target;
-  });
-}
-
 /// Level and procedure, or repetitions.
-void read_variation(ObjectReader& reader, TaskBlock& block) {
+void read_variation(ObjectReader& reader, const Protocol& protocol, TaskBlock& block) {
   if (block.task == TaskKind::reach)
     return reader.integer("repetitions", block.repetitions, kManyTimes, Presence::required);
-  read_level(reader, block);
+  read_level(reader, block.level, block.dimensions);
+  check_dimensions(reader, protocol, block);
   const bool varied = reader.has("level");
   if (block.task == TaskKind::adjust) {
     reader.integer("repetitions", block.repetitions, kManyTimes);
     if (!varied) reader.member("level", Presence::required);
     return;
   }
-  read_procedures(reader, block.procedures);
+  read_procedures(reader, block.dimensions, block.procedures);
   const bool procedural = varied || reader.has("procedure");
   if (varied != reader.has("procedure")) {
     reader.faults().add(reader.pointer(varied ? "procedure" : "level"),
@@ -472,7 +471,7 @@ void read_adjust(ObjectReader& reader, const Protocol& protocol, TaskBlock& bloc
 }
 
 /// Reads the levels that a program may ask for.
-void read_external(ObjectReader& reader, TaskBlock& block) {
+void read_external(ObjectReader& reader, const Protocol& protocol, TaskBlock& block) {
   constexpr int kMostIntervals = 10;
   reader.integer("trials", block.repetitions, kManyTimes, Presence::required);
   block.intervals = 1;
@@ -481,7 +480,8 @@ void read_external(ObjectReader& reader, TaskBlock& block) {
     reader.number("inter_interval_s", block.inter_interval, kWait);
     reader.number("interval_limit_s", block.interval_limit, kPresentation);
   }
-  read_level(reader, block);
+  read_level(reader, block.level, block.dimensions);
+  check_dimensions(reader, protocol, block);
   const Presence presence = block.level ? Presence::required : Presence::optional;
   double least = 0, most = 0;
   reader.number("min", least, kAnyNumber, presence);
@@ -601,7 +601,7 @@ void read_task_keys(ObjectReader& reader, const Protocol& protocol, TaskBlock& b
       read_adjust(reader, protocol, block);
       break;
     case TaskKind::external:
-      read_external(reader, block);
+      read_external(reader, protocol, block);
       break;
     case TaskKind::reach:
       read_reach(reader, block);
@@ -680,7 +680,7 @@ TaskBlock read_block(ObjectReader& reader, const Protocol& protocol) {
   read_block_renderers(reader, protocol, block);
   read_stimulus_names(reader, protocol, block);
   read_task_keys(reader, protocol, block);
-  if (block.task != TaskKind::external) read_variation(reader, block);
+  if (block.task != TaskKind::external) read_variation(reader, protocol, block);
   check_practice(reader, block);
   if (block.task != TaskKind::external)
     reader.section("order", [&](ObjectReader& order) {
@@ -753,6 +753,7 @@ void check_blocks(const Protocol& protocol, FaultList& faults) {
   for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
     const TaskBlock& block = protocol.blocks[i];
     check_levels_of(protocol, block, block_pointer(protocol.blocks[i].place), faults);
+    check_points_of(protocol, block, block_pointer(protocol.blocks[i].place), faults);
     if (block.level && block.task != TaskKind::detect && block.standard &&
         !own_level(protocol, block, *block.standard)) {
       faults.add(block_pointer(protocol.blocks[i].place) + "/standard",
@@ -833,6 +834,7 @@ void read_blocks(ObjectReader& reader, Protocol& protocol) {
     protocol.sessions.count = std::max(protocol.sessions.count, protocol.blocks.back().session);
   }
   check_sessions(protocol, reader.faults());
+  check_shared_dimensions(protocol, reader.faults());
   for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
     const TaskBlock& block = protocol.blocks[i];
     if (is_adaptive(block) && (block.max_run || block.min_distance)) {

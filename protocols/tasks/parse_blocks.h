@@ -12,15 +12,25 @@
 namespace palpate::protocols {
 
 /// Reads {"kind": "staircase", ...}; README.md lists the keys. nullopt if there are faults. Unknown
-/// keys become faults.
-std::optional<ProcedureSpec> read_procedure(ObjectReader& reader);
+/// keys become faults. \param dimensions  of the level; empty: it is one number
+std::optional<ProcedureSpec> read_procedure(ObjectReader& reader,
+                                            const std::vector<LevelDimension>& dimensions = {});
+
+/// Reads `level` of a block: one number, or several.
+void read_level(ObjectReader& reader, std::optional<LevelTarget>& number,
+                std::vector<LevelDimension>& dimensions);
+/// Faults dimensions that the block's task or the protocol's factors do not allow.
+void check_dimensions(ObjectReader& reader, const Protocol& protocol, const TaskBlock& block);
+/// Faults dimensions of one name with different units in several blocks.
+void check_shared_dimensions(const Protocol& protocol, FaultList& faults);
 
 /// Reads a block, which refers to the renderers, stimuli and factors of the protocol.
 TaskBlock read_block(ObjectReader& reader, const Protocol& protocol);
 /// Reads blocks, which refer to the renderers and stimuli of the protocol, and block_order.
 void read_blocks(ObjectReader& reader, Protocol& protocol);
 /// Reads `procedure` of a block: one, or a list of them.
-void read_procedures(ObjectReader& block, std::vector<ProcedureSpec>& procedures);
+void read_procedures(ObjectReader& block, const std::vector<LevelDimension>& dimensions,
+                     std::vector<ProcedureSpec>& procedures);
 /// Reads the steps of a labelled scale; without a number of its own a step has its place from 1.
 std::vector<ScaleStep> read_scale_steps(ObjectReader& reader, const char* key, Presence presence);
 /// Reads pages, which refer to the blocks.
