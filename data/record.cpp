@@ -40,8 +40,10 @@ bool has_right_answer(const TrialRecord& record) {
   const TaskRecord& task = record.task;
   if (task.task == "rate" || task.task == "adjust") return false;
   const bool which = record.response == "1" || record.response == "2";
-  return !(task.task == "compare" && which && task.intervals.size() == 2 && task.level &&
-           task.level == task.standard_level);
+  if (task.task != "compare" || !which || task.intervals.size() != 2) return true;
+  if (!task.dimensions.empty())
+    return !task.intervals[0].level || task.intervals[0].level != task.intervals[1].level;
+  return !(task.level && task.level == task.standard_level);
 }
 
 bool is_participant_code(std::string_view code) {

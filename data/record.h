@@ -7,6 +7,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace palpate::data {
@@ -41,7 +42,9 @@ struct SampleRecord {
 struct IntervalRecord {
   std::string stimulus;  ///< "": nothing was shown
   std::string renderer;
-  std::optional<double> level;  ///< none: the stimulus unchanged from the protocol
+  /// Of several dimensions: the value at the path of the one that answers are about. None: the
+  /// stimulus unchanged from the protocol.
+  std::optional<double> level;
   bool standard = false;
   std::int64_t onset_ns = 0, end_ns = 0;  ///< forces on, forces off; session clock; 0: not yet
 };
@@ -101,6 +104,9 @@ struct TaskRecord {
   int track = 1;                ///< stimulus, renderer and procedure
   std::optional<double> level;  ///< of the trial; adjust: start value; reach: the target, from 1
   std::optional<double> standard_level;  ///< of the standard, if it has one
+  /// Of a level of several dimensions, in the protocol's order: name and value. Empty: none, or a
+  /// catch trial.
+  std::vector<std::pair<std::string, double>> dimensions = {};
   bool catch_trial = false;
   /// In order; adjust: one for each stimulus felt. Empty: one, without a level (intervals_of).
   std::vector<IntervalRecord> intervals;

@@ -33,6 +33,10 @@ StoredBlock read_block(const nlohmann::json& json) {
   block.practice = json.is_object() && json.contains("practice") && json["practice"] == true;
   read_texts(json, "renderers", block.renderers);
   read_texts(json, "stimuli", block.stimuli);
+  if (json.is_object() && json.contains("level")) {
+    for (const auto& one : list_of(json["level"], "dimensions"))
+      read_text(one, "name", block.dimensions.emplace_back());
+  }
   return block;
 }
 

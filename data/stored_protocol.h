@@ -16,6 +16,7 @@ struct StoredBlock {
   std::string name, task;
   bool practice = false;
   std::vector<std::string> renderers, stimuli;  ///< names, in the block's order
+  std::vector<std::string> dimensions = {};     ///< names; empty: the level is one number, or none
 };
 
 /// A question of a page whose answer describes the participant: age, sex, handedness.

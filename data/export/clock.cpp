@@ -40,6 +40,18 @@ std::vector<StoredFactor> factors_of(const std::vector<ProtocolInfo>& protocols)
   return out;
 }
 
+/// The dimensions of the levels of all protocols, each once.
+std::vector<std::string> dimensions_of(const std::vector<ProtocolInfo>& protocols) {
+  std::vector<std::string> out;
+  for (const ProtocolInfo& protocol : protocols) {
+    for (const StoredBlock& block : read_stored_protocol(protocol.text).blocks) {
+      for (const std::string& name : block.dimensions)
+        if (std::ranges::find(out, name) == out.end()) out.push_back(name);
+    }
+  }
+  return out;
+}
+
 bool have_reaches(const std::vector<ProtocolInfo>& protocols) {
   const auto reaches = [](const StoredBlock& block) { return block.task == "reach"; };
   return std::ranges::any_of(protocols, [&](const ProtocolInfo& protocol) {
@@ -63,7 +75,8 @@ ExportClock::ExportClock(const std::vector<ProtocolInfo>& protocols, Times times
       seen_(have(protocols, &StoredProtocol::has_view)),
       heard_(have(protocols, &StoredProtocol::has_sound)),
       groups_(protocols),
-      factors_(factors_of(protocols)) {}
+      factors_(factors_of(protocols)),
+      dimensions_(dimensions_of(protocols)) {}
 
 ExportClock::ExportClock(Store& store, Times times) : ExportClock(store.protocols(), times) {
   torque_ = TorqueNotes(store);

@@ -40,6 +40,9 @@ class ExportClock {
   /// Rows of trials have a column for each factor of a protocol.
   const std::vector<StoredFactor>& factors() const { return factors_; }
 
+  /// Rows of trials have a column for each dimension of a block's level, by its name.
+  const std::vector<std::string>& dimensions() const { return dimensions_; }
+
   Times times() const { return times_; }
   bool relative() const { return times_ == Times::relative; }
   /// ISO 8601 of the onset of a trial, or of the start of an attempt that was cut off.
@@ -58,6 +61,7 @@ class ExportClock {
   TorqueNotes torque_;
   ParticipantGroups groups_;
   std::vector<StoredFactor> factors_;
+  std::vector<std::string> dimensions_;
   std::map<std::string, std::int64_t, std::less<>> firsts_;  // code -> ns since 1970
 };
 

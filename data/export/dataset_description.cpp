@@ -181,10 +181,13 @@ nlohmann::ordered_json column_levels(const Column& column, const ProtocolFacts& 
     add_answers(levels, facts);
   } else if (column.names == Column::Names::blocks) {
     for (const BlockFacts& block : facts.blocks) {
-      levels[guarded_text(block.name)] =
+      std::string meaning =
           block.task + (block.level_path.empty()
                             ? ""
                             : "; levels of " + block.level_path + " in " + block.level_unit);
+      for (const BlockFacts::Dimension& one : block.dimensions)
+        meaning += "; " + one.name + ": levels of " + one.path + " in " + one.unit;
+      levels[guarded_text(block.name)] = meaning;
     }
   }
   return levels;
@@ -192,11 +195,14 @@ nlohmann::ordered_json column_levels(const Column& column, const ProtocolFacts& 
 
 std::string unit_of(const Column& column, const ProtocolFacts& facts) {
   if (std::string_view(column.unit) != Column::kLevelUnit) return column.unit;
-  std::set<std::string> units;
+  std::set<std::string> units, named;
   for (const BlockFacts& block : facts.blocks) {
+    for (const BlockFacts::Dimension& one : block.dimensions)
+      if (one.name == column.name) named.insert(one.unit);
     if (!block.level_unit.empty()) units.insert(block.level_unit);
   }
-  return units.size() == 1 ? *units.begin() : column.unit;
+  if (named.size() == 1) return *named.begin();
+  return units.size() == 1 && named.empty() ? *units.begin() : column.unit;
 }
 
 nlohmann::ordered_json column_bits(const Column& column,

@@ -403,12 +403,28 @@ std::vector<Column> with_factors(std::vector<Column> columns,
   return columns;
 }
 
+std::vector<Column> with_dimensions(std::vector<Column> columns,
+                                    const std::vector<std::string>& names) {
+  const auto last = std::ranges::find_if(
+      columns, [](const Column& one) { return std::string_view(one.name) == "interval_levels"; });
+  std::vector<Column> more;
+  more.reserve(names.size());
+  for (const std::string& name : names)
+    more.push_back({kept(name),
+                    "Dimension of the varied level; missing in catch trials and if the block does "
+                    "not vary it",
+                    Column::kLevelUnit});
+  columns.insert(last + 1, more.begin(), more.end());
+  return columns;
+}
+
 /// Which columns a table has.
 struct ColumnSets {
   bool cut_off = false;  ///< of attempts that were cut off
   bool tasks = false, reaches = false, seen = false, heard = false, torque = false,
        relative = false, groups = false;
   std::vector<std::pair<std::string, std::string>> levels;  ///< of factors
+  std::vector<std::string> dimensions;
   auto operator<=>(const ColumnSets&) const = default;
 };
 
@@ -426,6 +442,7 @@ std::span<const Column> columns_for(const ExportClock& clock, bool cut_off) {
     sets.levels.emplace_back(factor.name, "");
     sets.levels.insert(sets.levels.end(), factor.levels.begin(), factor.levels.end());
   }
+  if (!cut_off) sets.dimensions = clock.dimensions();
   static std::map<ColumnSets, std::vector<Column>> tables;
   static std::mutex mutex;
   const std::lock_guard lock(mutex);
@@ -434,6 +451,7 @@ std::span<const Column> columns_for(const ExportClock& clock, bool cut_off) {
   if (!is_new) return columns;
   columns = cut_off ? make_attempts() : make_trials();
   if (sets.tasks) columns = with_tasks(std::move(columns));
+  if (!sets.dimensions.empty()) columns = with_dimensions(std::move(columns), sets.dimensions);
   if (sets.reaches) columns = with_reaches(std::move(columns));
   if (sets.seen) columns = with_sight(std::move(columns));
   if (sets.heard) columns = with_sound(std::move(columns));
@@ -511,6 +529,7 @@ TaskValues::TaskValues(const TrialRecord& record) {
   success = from.success;
   number = from.number;
   confidence = from.confidence;
+  dimensions = from.dimensions;
   if (from.confidence_ns)
     confidence_delay = static_cast<double>(*from.confidence_ns - record.response_ns) / 1e9;
   for (std::size_t i = 0; i < from.intervals.size(); ++i) {
@@ -521,6 +540,12 @@ TaskValues::TaskValues(const TrialRecord& record) {
     add_to_list(levels, interval.level, i == 0);
     if (from.task == "compare" && !interval.standard) comparison_interval = static_cast<int>(i) + 1;
   }
+}
+
+std::optional<double> TaskValues::dimension(const std::string& name) const {
+  const auto found = std::ranges::find(dimensions, name, &std::pair<std::string, double>::first);
+  if (found == dimensions.end()) return std::nullopt;
+  return found->second;
 }
 
 void put_attempt(DelimitedRow& row, const StoredTrial& attempt, const ExportClock& clock) {

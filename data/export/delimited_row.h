@@ -108,6 +108,10 @@ struct TaskValues {
   std::optional<double> number, confidence, confidence_delay;  // s
   std::optional<int> comparison_interval;
   std::string onsets, ends, levels;
+  std::vector<std::pair<std::string, double>> dimensions;
+
+  /// Missing: the trial's block has no such dimension, or it is a catch trial.
+  std::optional<double> dimension(const std::string& name) const;
 };
 
 /// Missing where no answer is right or wrong.
@@ -149,6 +153,7 @@ void put_columns_of_trial(Row& row, const StoredTrial& trial, const ExportClock&
         << task.catch_trial << task.success << task.number << task.confidence
         << task.confidence_delay << task.comparison_interval << task.onsets << task.ends
         << task.levels;
+    for (const std::string& name : clock.dimensions()) row << task.dimension(name);
   }
   if (clock.reaches()) {
     const ReachRecord reach = record.task.reach.value_or(ReachRecord());

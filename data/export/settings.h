@@ -24,6 +24,11 @@ struct BlockFacts {
   std::string name, task;
   std::string level_path;  ///< JSON pointer of the varied number; "" for none
   std::string level_unit;
+  /// Of a level of several numbers, in place of both.
+  struct Dimension {
+    std::string name, path, unit;
+  };
+  std::vector<Dimension> dimensions = {};
 };
 
 /// Facts from a protocol that an export needs; the caller parses them, because data/ cannot.

@@ -64,6 +64,10 @@ void validate_task(Validator& validator, const TaskRecord& task) {
   for (const auto& value : {task.level, task.standard_level, task.number, task.confidence}) {
     if (value) validator.finite("a number of the task", *value);
   }
+  for (const auto& [name, value] : task.dimensions) {
+    validator.present("name of a dimension", name);
+    validator.finite("a level", value);
+  }
   if (task.reach) {
     const ReachRecord& reach = *task.reach;
     validator.present("kind of a reach", reach.kind);

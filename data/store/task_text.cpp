@@ -64,6 +64,7 @@ std::optional<std::string> task_text(const TaskRecord& task) {
   Json out = {{"task", task.task}, {"block_name", task.block_name}, {"track", task.track}};
   put_if(out, "level", task.level);
   put_if(out, "standard_level", task.standard_level);
+  for (const auto& [name, value] : task.dimensions) out["levels"][name] = value;
   out["catch_trial"] = task.catch_trial;
   if (task.intervals.empty()) return out.dump();
   out["intervals"] = Json::array();
@@ -103,6 +104,10 @@ TaskRecord parse_task_text(const std::string& text) {
     task.track = in.at("track").get<int>();
     take_if(in, "level", task.level);
     take_if(in, "standard_level", task.standard_level);
+    if (in.contains("levels")) {
+      for (const auto& [name, value] : in.at("levels").items())
+        task.dimensions.emplace_back(name, value.get<double>());
+    }
     task.catch_trial = in.at("catch_trial").get<bool>();
     if (!in.contains("intervals")) return task;
     for (const Json& interval : in.at("intervals")) task.intervals.push_back(interval_of(interval));
