@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "data/export/sample_slots.h"
+#include "protocols/tasks/levels.h"
 #include "runner/session/live_forces.h"
 #include "runner/session/replay.h"
 #include "stimuli/convex_mesh.h"
@@ -129,11 +130,13 @@ TouchedTick between(const TouchedTick& before, const TouchedTick& after, double 
 bool keeps_geometry(const protocols::Protocol& protocol, const data::TaskRecord& task) {
   const auto block =
       std::ranges::find(protocol.blocks, task.block_name, &protocols::TaskBlock::name);
-  if (block == protocol.blocks.end() || !block->level) return true;
-  const std::string& path = block->level->pointer;
-  const std::string last = path.substr(path.rfind('/') + 1);
-  return last.starts_with("stiffness_") || last.starts_with("damping_") ||
-         last.starts_with("friction_");
+  if (block == protocol.blocks.end()) return true;
+  return std::ranges::all_of(
+      protocols::targets_of(*block), [](const protocols::LevelTarget& target) {
+        const std::string last = target.pointer.substr(target.pointer.rfind('/') + 1);
+        return last.starts_with("stiffness_") || last.starts_with("damping_") ||
+               last.starts_with("friction_");
+      });
 }
 
 /// Reason why a trial of a block has no measures; empty: it has one interval with the stimulus as

@@ -16,9 +16,7 @@ std::shared_ptr<const display::SeenTrial> seen_trial_of(const protocols::Protoco
                                                         const protocols::Interval& interval) {
   if (!protocol.view || interval.stimulus < 0) return nullptr;
   const protocols::TaskBlock& block = protocols::block_of(protocol, trial);
-  const protocols::StimulusSpec shown =
-      interval.level ? protocols::at_level(protocol, block, interval.stimulus, *interval.level)
-                     : protocol.stimuli[static_cast<std::size_t>(interval.stimulus)];
+  const protocols::StimulusSpec shown = protocols::shown_stimulus(protocol, block, interval);
   if (!shown.seen || !shown.seen->anything() || !protocols::is_seen(block, interval))
     return nullptr;
   auto out = std::make_shared<display::SeenTrial>();

@@ -86,7 +86,8 @@ std::vector<int> forms_of(const protocols::Protocol& protocol, const protocols::
 bool is_identified_by_shape(const protocols::Protocol& protocol,
                             const protocols::TaskBlock& block) {
   if (block.order == protocols::BlockOrder::shapes) return true;
-  if (block.task != protocols::TaskKind::identify || block.level) return false;
+  if (block.task != protocols::TaskKind::identify || !protocols::targets_of(block).empty())
+    return false;
   const std::vector<int> forms = forms_of(protocol, block);
   for (std::size_t i = 0; i < forms.size(); ++i) {
     const auto object = [&](std::size_t k) -> const stimuli::ObjectSpec& {
@@ -137,15 +138,26 @@ bool differ_in_stiffness(const protocols::Protocol& protocol, const protocols::T
   return block.stimuli.size() > 1;
 }
 
+namespace {
+
+/// JSON pointer of the number that a block's answers are about; "": nothing is varied.
+std::string varied_path(const protocols::TaskBlock& block) {
+  if (block.level) return block.level->pointer;
+  return block.dimensions.empty() ? "" : protocols::judged_dimension(block).target.pointer;
+}
+
+}  // namespace
+
 void LevelPercept::begin(const protocols::Trial& trial, const protocols::Interval& interval) {
   const auto& block = protocols::block_of(protocol_, trial);
   orientation_ = trial.orientation;
   stiffness_sum_ = squares_ = products_ = 0;
   contact_ticks_ = 0;
   level_.reset();
-  of_stiffness_ = block.level ? block.level->pointer == "/stiffness_n_per_m"
-                              : block.task == protocols::TaskKind::identify &&
-                                    differ_in_stiffness(protocol_, block);
+  const std::string varied = varied_path(block);
+  of_stiffness_ = !varied.empty() ? varied == "/stiffness_n_per_m"
+                                  : block.task == protocols::TaskKind::identify &&
+                                        differ_in_stiffness(protocol_, block);
   if (block.level && interval.stimulus >= 0 && is_length(block.level->pointer))
     know_object(block, interval);
 }
@@ -213,10 +225,34 @@ void TaskJudgement::begin(const protocols::Trial& trial, const Random& random) {
 const TaskBlock& TaskJudgement::block() const { return protocols::block_of(protocol_, trial_); }
 
 double TaskJudgement::level_of(const protocols::Interval& interval) const {
+  if (!block().dimensions.empty())
+    return protocols::judged_value(protocol_, block(), interval).value_or(1 + interval.stimulus);
   if (interval.level) return *interval.level;
   if (interval.stimulus < 0) return 0;
   return protocols::own_level(protocol_, block(), interval.stimulus)
       .value_or(1 + interval.stimulus);
+}
+
+std::vector<double> TaskJudgement::levels() const {
+  if (block().dimensions.empty()) return protocols::levels_of(block());
+  const std::string judged = varied_path(block());
+  const std::vector<protocols::DimensionRange> ranges = protocols::ranges_of(block());
+  std::vector<double> ends;
+  for (std::size_t d = 0; d < ranges.size(); ++d) {
+    if (block().dimensions[d].target.pointer != judged) continue;
+    ends.push_back(ranges[d].min);
+    ends.push_back(ranges[d].max);
+  }
+  std::ranges::sort(ends);
+  return ends;
+}
+
+protocols::Interval TaskJudgement::standard_interval() const {
+  const auto shown = std::ranges::find(trial_.intervals, true, &protocols::Interval::standard);
+  protocols::Interval standard;
+  standard.stimulus = *block().standard;
+  if (!block().dimensions.empty() && shown != trial_.intervals.end()) standard = *shown;
+  return standard;
 }
 
 int TaskJudgement::index_of(const char* name) const {
@@ -238,9 +274,9 @@ double TaskJudgement::planned_noise(double noise, double reference) const {
 
 /// Standard deviation, in the level's unit.
 double TaskJudgement::noise_of_difference(double reference) const {
-  if (block().level && block().level->orientation) return settings_.turn_sd;
+  if (varied_path(block()) == "/orientation") return settings_.turn_sd;
   if (reference != 0) return planned_noise(settings_.weber * std::abs(reference), reference);
-  const std::vector<double> levels = protocols::levels_of(block());
+  const std::vector<double> levels = this->levels();
   if (levels.empty()) return 0;
   return settings_.weber * std::max(std::abs(levels.front()), std::abs(levels.back()));
 }
@@ -256,14 +292,11 @@ TaskJudgement::Sight TaskJudgement::sight_of(const protocols::Interval& interval
   Sight out;
   if (!protocol_.view || interval.stimulus < 0) return out;
   const TaskBlock& asked = block();
-  const protocols::StimulusSpec shown =
-      interval.level && asked.level
-          ? protocols::at_level(protocol_, asked, interval.stimulus, *interval.level)
-          : protocol_.stimuli[static_cast<std::size_t>(interval.stimulus)];
+  const protocols::StimulusSpec shown = protocols::shown_stimulus(protocol_, asked, interval);
   out.felt = shown.felt;
   if (!shown.seen || !shown.seen->object || !protocols::is_seen(asked, interval)) return out;
   const double level = level_of(interval);
-  const std::string& pointer = asked.level ? asked.level->pointer : "";
+  const std::string pointer = varied_path(asked);
   double seen = level, blur = 0;
   if (pointer == "/stiffness_n_per_m") {
     seen = shown.seen->give_stiffness.value_or(level);
@@ -291,7 +324,7 @@ double TaskJudgement::with_sight(const protocols::Interval& interval, std::optio
   estimates.seen = *sight.level + sight.sd * random_.normal();
   estimates.seen_sd = sight.sd;
   estimates.lag = sight.lag;
-  if (const auto levels = protocols::levels_of(block()); !levels.empty())
+  if (const auto levels = this->levels(); !levels.empty())
     estimates.range = levels.back() - levels.front();
   if (!look_) look_ = random_.unit();
   estimates.looks = *look_ < weight_of_seen(sd, sight.sd);
@@ -305,17 +338,13 @@ void TaskJudgement::feel(const protocols::Interval& interval, const Felt& given)
   touched_ = felt.touched;
   last_level_ = felt.measured.value_or(level_of(interval));
   double reference = last_level_;
-  if (block().standard) {
-    protocols::Interval standard;
-    standard.stimulus = *block().standard;
-    reference = level_of(standard);
-  }
+  if (block().standard) reference = level_of(standard_interval());
   feels_standard_ = interval.standard;
   if (!felt.touched && block().task == TaskKind::adjust) {  // no answer is needed yet
     (interval.standard ? standard_ : own_).reset();
     return;
   }
-  if (const auto levels = protocols::levels_of(block()); !felt.touched && !levels.empty())
+  if (const auto levels = this->levels(); !felt.touched && !levels.empty())
     last_level_ = levels.front() + random_.unit() * (levels.back() - levels.front());
   const double sd = felt.noisy ? 0 : noise_of_difference(reference) / std::sqrt(2.0);
   const double less = interval.standard ? 0 : settings_.shift * noise_of_difference(reference);
@@ -335,7 +364,9 @@ std::optional<int> TaskJudgement::compared() {
   const TaskBlock& asked = block();
   if (estimates_.size() < 2) return std::nullopt;
   double reference = estimates_.front();
-  if (asked.standard)
+  if (asked.standard && !asked.dimensions.empty())
+    reference = level_of(standard_interval());
+  else if (asked.standard)
     reference = protocols::own_level(protocol_, asked, *asked.standard).value_or(reference);
   const double sd = std::max(1e-300, noise_of_difference(reference));
   if (asked.same_different) {
@@ -352,6 +383,10 @@ int TaskJudgement::detected() {
   double yes = settings_.false_alarm;
   if (!trial_.catch_trial && touched_) {
     yes = 1 - settings_.lapse;
+    if (!trial_.point.empty())
+      yes = protocols::typical_success(
+          protocol_, trial_,
+          {settings_.threshold, settings_.spread, settings_.false_alarm, settings_.lapse});
     if (trial_.level) {
       const protocols::PsychometricParticipant typical = protocols::typical_participant(
           protocol_, block(),
@@ -390,7 +425,7 @@ int TaskJudgement::identified() {
     return static_cast<int>((static_cast<std::uint64_t>(right) + 1 + random_.below(count - 1)) %
                             count);
   }
-  if (measured_ && !block().level) {
+  if (measured_ && protocols::targets_of(block()).empty()) {
     const auto apart = [&](int stimulus) {
       const double own =
           protocol_.stimuli[static_cast<std::size_t>(stimulus)].object.material.stiffness;
@@ -407,7 +442,7 @@ int TaskJudgement::identified() {
 int TaskJudgement::rated(std::uint64_t steps) {
   const auto last = static_cast<double>(steps - 1);
   // The step nearest to the level's place among all levels.
-  const std::vector<double> levels = protocols::levels_of(block());
+  const std::vector<double> levels = this->levels();
   const double range = levels.empty() ? 0 : levels.back() - levels.front();
   const double place = range > 0 ? (estimates_.back() - levels.front()) / range : 0.5;
   double step = std::clamp(place, 0.0, 1.0) * last;
@@ -439,7 +474,7 @@ double TaskJudgement::number() {
     const double rated = middle + settings_.rating + settings_.rating_sd * random_.normal();
     return std::clamp(std::round(rated), asked.least.value_or(rated), asked.most.value_or(rated));
   }
-  const bool of_period = asked.level && asked.level->pointer == "/texture/period_m";
+  const bool of_period = varied_path(asked) == "/texture/period_m";
   const double exponent = of_period ? settings_.period_exponent : settings_.exponent;
   double scale = 10;
   if (asked.standard && asked.modulus > 0 && estimates_.size() > 1)

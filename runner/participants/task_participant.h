@@ -146,6 +146,9 @@ class TaskJudgement {
  private:
   const protocols::TaskBlock& block() const;
   double level_of(const protocols::Interval& interval) const;
+  /// Levels of the number that answers are about: all of one, the ends of a dimension.
+  std::vector<double> levels() const;
+  protocols::Interval standard_interval() const;  ///< \pre the block has a standard
   int index_of(const char* name) const;
   std::optional<int> compared();
   int detected();

@@ -7,7 +7,11 @@
 namespace palpate::runner::session {
 
 inline protocols::TrialOutcome outcome_of(const data::TrialRecord& record) {
-  return {record.correct, record.task.success, !record.timed_out, record.task.level};
+  protocols::TrialOutcome outcome{record.correct, record.task.success, !record.timed_out,
+                                  record.task.level};
+  for (const auto& [name, value] : record.task.dimensions) outcome.point.push_back(value);
+  outcome.block = record.block;
+  return outcome;
 }
 
 }  // namespace palpate::runner::session

@@ -187,6 +187,16 @@ protocols::Interval interval_of(const protocols::Protocol& protocol,
   return one;
 }
 
+/// Of a level of several dimensions, the point takes the place of the recorded level.
+void put_point(const protocols::Protocol& protocol, const protocols::Trial& trial,
+               const data::TaskRecord& task, protocols::Interval& interval) {
+  const protocols::TaskBlock& block = protocols::block_of(protocol, trial);
+  if (block.dimensions.empty()) return;
+  interval.level.reset();
+  if (task.dimensions.size() != block.dimensions.size() || interval.stimulus < 0) return;
+  for (const auto& [name, value] : task.dimensions) interval.point.push_back(value);
+}
+
 ReplayedInterval interval_of(const data::TrialRecord& record, std::size_t number) {
   const data::IntervalRecord interval = data::intervals_of(record)[number];
   return {interval.stimulus, interval.renderer, interval.level, interval.standard};
@@ -199,7 +209,8 @@ std::vector<ShownInterval> scenes_of(const protocols::Protocol& protocol,
   std::vector<ShownInterval> shown;
   SessionScenes scenes(protocol, library);
   for (const data::IntervalRecord& interval : data::intervals_of(recorded)) {
-    const protocols::Interval one = interval_of(protocol, interval, other);
+    protocols::Interval one = interval_of(protocol, interval, other);
+    put_point(protocol, trial, recorded.task, one);
     shown.push_back({one.renderer, scenes.scene(trial, one)});
   }
   return shown;

@@ -33,6 +33,13 @@ constexpr double kPerSecond_ns = 1e9;
 /// either answer would do, it follows the rule of the other levels.
 bool comparison_is_right(const protocols::TaskBlock& block, const data::TaskRecord& task,
                          int side) {
+  if (block.intervals == 2 && !task.dimensions.empty()) {
+    std::optional<double> standard, other;
+    for (const data::IntervalRecord& interval : task.intervals)
+      (interval.standard ? standard : other) = interval.level;
+    if (!standard || !other) return true;
+    return block.asks_smaller ? *other <= *standard : *other >= *standard;
+  }
   if (block.intervals > 2 || !task.level || !task.standard_level) return true;
   if (side != 0) return (side > 0) != block.asks_smaller;
   return block.asks_smaller ? *task.level <= *task.standard_level
@@ -118,6 +125,8 @@ void Session::plan_task(const protocols::Trial& trial, data::TrialRecord& record
   task.block_name = block.name;
   task.track = trial.track;
   task.level = trial.level;
+  for (std::size_t d = 0; d < trial.point.size(); ++d)
+    task.dimensions.emplace_back(block.dimensions[d].name, trial.point[d]);
   task.catch_trial = trial.catch_trial;
   if (block.standard)
     task.standard_level = protocols::own_level(station_.protocol, block, *block.standard);
@@ -134,7 +143,9 @@ void Session::prepare_interval(const protocols::Trial& trial, const protocols::I
   if (interval.stimulus >= 0)
     record.stimulus = station_.protocol.stimuli[static_cast<std::size_t>(interval.stimulus)].name;
   record.renderer = protocols::to_string(interval.renderer);
-  record.level = interval.level;
+  record.level = trial.point.empty()
+                     ? interval.level
+                     : protocols::judged_value(station_.protocol, task_of(trial), interval);
   record.standard = interval.standard;
   const rendering::Scene scene = scenes_.scene(trial, interval);
   const rendering::Renderer& renderer = renderer_for(interval.renderer);
@@ -379,23 +390,46 @@ void Session::judge(const protocols::Trial& trial, const participants::Answer& a
 }
 
 /// Ask once per trial, repeats included. Without an answer the block's own procedure continues,
-/// which is recorded.
-void Session::ask_level() {
+/// which is recorded. \return false: the program ended the block
+bool Session::ask_level() {
   const protocols::Trial& trial = station_.plan.next();
-  if (station_.advisor == nullptr || !trial.level) return;
-  if (!protocols::is_adaptive(task_of(trial)) || asked_trial_ == trial.trial) return;
+  if (station_.advisor == nullptr || (!trial.level && trial.point.empty())) return true;
+  const protocols::TaskBlock& block = task_of(trial);
+  if (!protocols::is_adaptive(block) || asked_trial_ == trial.trial) return true;
   asked_trial_ = trial.trial;
-  if (const std::optional<double> level = station_.advisor->ask(trial)) {
-    station_.plan.propose(*level);
-    return;
+  const auto note = [&](const nlohmann::ordered_json& event) {
+    station_.log.note(station_.clock.now_ns(),
+                      event.dump(-1, ' ', true, nlohmann::ordered_json::error_handler_t::replace));
+  };
+  const std::optional<Proposal> proposal = station_.advisor->ask(trial);
+  if (proposal && proposal->finished) {
+    note({{"block_ended_by_program",
+           {{"session", trial.session}, {"block", block.name}, {"before_trial", trial.trial}}}});
+    asked_trial_ = 0;  // the next trial has the same number
+    station_.plan.end_block();
+    return false;
   }
-  const nlohmann::ordered_json event = {{"level_from_own_procedure",
-                                         {{"session", trial.session},
-                                          {"trial", trial.trial},
-                                          {"level", *trial.level},
-                                          {"reason", station_.advisor->trouble()}}}};
-  station_.log.note(station_.clock.now_ns(),
-                    event.dump(-1, ' ', true, nlohmann::ordered_json::error_handler_t::replace));
+  if (proposal && !proposal->point.empty()) {
+    station_.plan.propose(proposal->point);
+  } else if (proposal) {
+    station_.plan.propose(*proposal->level);
+  } else {
+    nlohmann::ordered_json own = {{"session", trial.session}, {"trial", trial.trial}};
+    if (trial.level) own["level"] = *trial.level;
+    for (std::size_t d = 0; d < trial.point.size(); ++d)
+      own["levels"][block.dimensions[d].name] = trial.point[d];
+    own["reason"] = station_.advisor->trouble();
+    note({{"level_from_own_procedure", own}});
+  }
+  return true;
+}
+
+/// The state before the next trial; after the last one, pages and the end are shown.
+void Session::go_on() {
+  state_ = before_trial();
+  if (state_ != State::end) return;
+  show_pages(protocols::PageSpec::When::after);
+  participant_.read(station_.protocol.texts.end);
 }
 
 void Session::report_level() {
@@ -535,7 +569,10 @@ void Session::step() {
       state_ = State::trial;
       break;
     case State::trial:
-      if (run_trial()) state_ = State::response;
+      if (!ask_level())
+        go_on();
+      else if (run_trial())
+        state_ = State::response;
       break;
     case State::response:
       station_.log.finish(record_);
@@ -543,11 +580,7 @@ void Session::step() {
       participant_.learn_from(record_);
       report_level();
       give_feedback();
-      state_ = before_trial();
-      if (state_ == State::end) {
-        show_pages(protocols::PageSpec::When::after);
-        participant_.read(texts.end);
-      }
+      go_on();
       break;
     case State::end:
       break;
@@ -594,7 +627,6 @@ void Session::cut_off(const std::string& reason) {
 }
 
 bool Session::run_trial() {
-  ask_level();
   if (const auto choice = participant_.choose(station_.plan.next())) station_.plan.choose(*choice);
   const protocols::Trial& trial = station_.plan.next();
   record_ = planned_record(trial);

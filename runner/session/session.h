@@ -83,7 +83,8 @@ class Session {
   void judge(const protocols::Trial& trial, const participants::Answer& answer);
   void ask_confidence(const protocols::ConfidenceSpec& asked);
   void begin_task_block();
-  void ask_level();
+  bool ask_level();
+  void go_on();
   void report_level();
   void read_instructions(const protocols::TaskBlock& block);
   void resume_task_block();

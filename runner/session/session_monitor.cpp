@@ -178,6 +178,12 @@ void SessionMonitor::interval(const protocols::Trial& trial,
   if (shown != nullptr) {
     state_.renderer = protocols::to_string(shown->renderer);
     if (shown->stimulus >= 0) objects.push_back(shown_object(station_.protocol, trial, *shown));
+    for (std::size_t d = 0; d < shown->point.size(); ++d) {
+      const protocols::LevelDimension& one = block.dimensions[d];
+      if (!one.applies_to(shown->standard)) continue;
+      state_.level += (state_.level.empty() ? "" : ", ") + one.name + " " +
+                      protocols::number_in_words(one.target.pointer, shown->point[d]);
+    }
     std::optional<double> level = shown->level;
     if (!level && block.level && shown->stimulus >= 0)
       level = protocols::own_level(station_.protocol, block, shown->stimulus);

@@ -14,10 +14,7 @@ constexpr std::size_t kMostKnown = 32;  // a sphere with its trees takes a megab
 protocols::StimulusSpec shown_stimulus(const protocols::Protocol& protocol,
                                        const protocols::Trial& trial,
                                        const protocols::Interval& interval) {
-  if (interval.level)
-    return protocols::at_level(protocol, protocols::block_of(protocol, trial), interval.stimulus,
-                               *interval.level);
-  return protocol.stimuli[static_cast<std::size_t>(interval.stimulus)];
+  return protocols::shown_stimulus(protocol, protocols::block_of(protocol, trial), interval);
 }
 
 }  // namespace
@@ -32,8 +29,9 @@ SessionScenes::SessionScenes(const protocols::Protocol& protocol, const Stimulus
 
 SessionScenes::Place SessionScenes::find(const protocols::Trial& trial,
                                          const protocols::Interval& interval) {
-  if (library_ != nullptr && !interval.level) return {*library_, interval.stimulus};
-  auto key = std::make_tuple(trial.task_block, interval.stimulus, interval.level);
+  if (library_ != nullptr && !interval.level && interval.point.empty())
+    return {*library_, interval.stimulus};
+  Shown key{trial.task_block, interval.stimulus, interval.level, interval.standard, interval.point};
   if (const auto found = known_.find(key); found != known_.end()) return {*found->second, 0};
   if (known_.size() >= kMostKnown) known_.clear();
   one_.stimuli.clear();

@@ -35,9 +35,9 @@ class SessionScenes {
   const protocols::Protocol& protocol_;
   const StimulusLibrary* library_;
   protocols::Protocol one_;  ///< the protocol with one stimulus
-  /// By block, stimulus and level; only the newest ones are kept.
-  std::map<std::tuple<int, int, std::optional<double>>, std::unique_ptr<const StimulusLibrary>>
-      known_;
+  /// Block, stimulus, level, whether it is the standard, and point.
+  using Shown = std::tuple<int, int, std::optional<double>, bool, protocols::LevelPoint>;
+  std::map<Shown, std::unique_ptr<const StimulusLibrary>> known_;  ///< only the newest are kept
 };
 
 /// What is heard of its contacts, at the interval's level; none: nothing.

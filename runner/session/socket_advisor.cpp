@@ -20,6 +20,8 @@
 #include "protocols/groups.h"
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
+#include "runner/scene_builder.h"
+#include "runner/session/device_check.h"
 
 namespace palpate::runner::session {
 namespace {
@@ -35,16 +37,54 @@ std::string line_of(const AdvisorJson& message) {
 
 AdvisorJson json_of(const data::TrialRecord& record) {
   const data::TaskRecord& task = record.task;
-  return {{"trial", record.trial},
-          {"block", task.block_name},
-          {"track", task.track},
-          {"level", task.level ? AdvisorJson(*task.level) : AdvisorJson()},
-          {"success", task.success},
-          {"correct", record.correct},
-          {"answered", !record.timed_out},
-          {"catch_trial", task.catch_trial},
-          {"response", record.timed_out ? AdvisorJson() : AdvisorJson(record.response)},
-          {"response_time_s", record.response_time}};
+  AdvisorJson out{{"trial", record.trial},
+                  {"block", task.block_name},
+                  {"track", task.track},
+                  {"level", task.level ? AdvisorJson(*task.level) : AdvisorJson()},
+                  {"success", task.success},
+                  {"correct", record.correct},
+                  {"answered", !record.timed_out},
+                  {"catch_trial", task.catch_trial},
+                  {"response", record.timed_out ? AdvisorJson() : AdvisorJson(record.response)},
+                  {"response_time_s", record.response_time}};
+  for (const auto& [name, value] : task.dimensions) out["levels"][name] = value;
+  return out;
+}
+
+/// What a dimension's range is called in messages.
+std::string range_text(const protocols::LevelDimension& dimension,
+                       const protocols::DimensionRange& range) {
+  return "'" + dimension.name + "' from " + protocols::level_text(range.min) + " to " +
+         protocols::level_text(range.max);
+}
+
+/// The point that a program names. \param trouble  set if it is none, or beyond the ranges
+protocols::LevelPoint point_in(const nlohmann::json& levels, const protocols::TaskBlock& block,
+                               std::string& trouble) {
+  protocols::LevelPoint point;
+  if (!levels.is_object()) {
+    trouble = "expected levels, an object with a number for each dimension";
+    return point;
+  }
+  const std::vector<protocols::DimensionRange> ranges = protocols::ranges_of(block);
+  for (std::size_t d = 0; d < block.dimensions.size() && trouble.empty(); ++d) {
+    const protocols::LevelDimension& dimension = block.dimensions[d];
+    const auto given = levels.find(dimension.name);
+    const double value = given != levels.end() && given->is_number() ? given->get<double>() : NAN;
+    if (given == levels.end())
+      trouble = "expected a level for " + range_text(dimension, ranges[d]) + ": it is missing";
+    else if (!(value >= ranges[d].min && value <= ranges[d].max))
+      trouble = "expected a level for " + range_text(dimension, ranges[d]);
+    point.push_back(value);
+  }
+  for (const auto& [name, value] : levels.items()) {
+    const auto known = std::ranges::find(block.dimensions, name, &protocols::LevelDimension::name);
+    if (trouble.empty() && known == block.dimensions.end())
+      trouble = "expected no level for '" + printable(name, kMostShown) +
+                "': the block has no such dimension";
+  }
+  if (!trouble.empty()) point.clear();
+  return point;
 }
 
 int milliseconds_until(steady_clock::time_point until) {
@@ -178,15 +218,46 @@ std::string SocketAdvisor::refusal(const std::string& message, int trial) const 
   return line_of({{"type", "refused"}, {"trial", trial}, {"message", message}});
 }
 
-/// nullopt with trouble_: an invalid line; without: the level answers an earlier question.
-std::optional<double> SocketAdvisor::level_in(const std::string& line,
-                                              const protocols::Trial& next) {
+std::string SocketAdvisor::fault_of(const protocols::LevelPoint& point,
+                                    const protocols::Trial& next) const {
+  const auto& block = protocols::block_of(protocol_, next);
+  protocols::Protocol shown = protocol_;
+  shown.blocks.clear();
+  shown.stimuli.clear();
+  shown.stimulus_texts.clear();
+  try {
+    for (const protocols::Interval& interval : next.intervals) {
+      if (interval.stimulus >= 0 && !interval.point.empty())
+        shown.stimuli.push_back(
+            protocols::at_point(protocol_, block, interval.stimulus, point, interval.standard));
+    }
+    if (settings_.device == nullptr) return "";
+    const std::vector<std::string> reasons =
+        incompatibilities(shown, StimulusLibrary(shown), *settings_.device);
+    return reasons.empty() ? "" : reasons.front();
+  } catch (const protocols::InputError& error) {
+    return error.faults().front().location + ": " + error.faults().front().expected;
+  } catch (const stimuli::MeshError& error) {
+    return error.what();
+  }
+}
+
+/// nullopt with trouble_: an invalid line; without: it answers an earlier question.
+std::optional<Proposal> SocketAdvisor::proposal_in(const std::string& line,
+                                                   const protocols::Trial& next) {
   const std::string found = "; found " + printable(line, kMostShown);
+  const auto& block = protocols::block_of(protocol_, next);
+  const bool several = !block.dimensions.empty();
+  const char* const kind = several ? "levels" : "level";
   const auto message = json_or_discarded(line);
+  const auto type = message.is_object() ? message.value("type", nlohmann::json()) : nullptr;
+  const bool finished = type == "finished";
+  if (finished && !message.contains("trial")) return Proposal{.finished = true};
   if (!message.is_object() || !message.contains("trial") || !message["trial"].is_number_integer() ||
-      message.value("type", nlohmann::json()) != "level") {
-    trouble_ = R"(expected {"type": "level", "trial": )" + std::to_string(next.trial) +
-               R"(, "level": X})" + found;
+      (type != kind && !finished)) {
+    trouble_ = R"(expected {"type": ")" + std::string(kind) + R"(", "trial": )" +
+               std::to_string(next.trial) + R"(, ")" + kind + R"(": )" +
+               (several ? "{NAME: X, ...}}" : "X}") + found;
     return std::nullopt;
   }
   if (message["trial"].get<std::int64_t>() < next.trial) return std::nullopt;
@@ -194,44 +265,78 @@ std::optional<double> SocketAdvisor::level_in(const std::string& line,
     trouble_ = "expected the answer to trial " + std::to_string(next.trial) + found;
     return std::nullopt;
   }
-  const auto& block = protocols::block_of(protocol_, next);
+  if (finished) return Proposal{.finished = true};
+  if (several) {
+    protocols::LevelPoint point =
+        point_in(message.value("levels", nlohmann::json()), block, trouble_);
+    if (trouble_.empty()) {
+      const std::string fault = fault_of(point, next);
+      if (fault.empty()) return Proposal{.point = std::move(point)};
+      trouble_ = "expected levels that can be shown: at " + protocols::point_text(block, point) +
+                 ", " + fault;
+    }
+    trouble_ += found;
+    return std::nullopt;
+  }
   const std::vector<double> levels = protocols::levels_of(block);
   const auto level = message.value("level", nlohmann::json());
   const double value = level.is_number() ? level.get<double>() : NAN;
-  if (value >= levels.front() && value <= levels.back()) return value;
+  if (value >= levels.front() && value <= levels.back()) return Proposal{.level = value};
   trouble_ = "expected a level from " + protocols::level_text(levels.front()) + " to " +
              protocols::level_text(levels.back()) + found;
   return std::nullopt;
 }
 
-std::optional<double> SocketAdvisor::ask(const protocols::Trial& next) {
+namespace {
+
+/// What may be answered about a trial.
+AdvisorJson range_json(const protocols::TaskBlock& block, const protocols::Trial& next) {
+  AdvisorJson out;
+  if (block.dimensions.empty()) {
+    const std::vector<double> levels = protocols::levels_of(block);
+    out["path"] = block.level->pointer;
+    out["least"] = levels.front();
+    out["most"] = levels.back();
+    out["own"] = *next.level;
+    return out;
+  }
+  const std::vector<protocols::DimensionRange> ranges = protocols::ranges_of(block);
+  out["dimensions"] = AdvisorJson::array();
+  for (std::size_t d = 0; d < ranges.size(); ++d) {
+    const protocols::LevelDimension& one = block.dimensions[d];
+    out["dimensions"].push_back({{"name", one.name},
+                                 {"path", one.target.pointer},
+                                 {"of", protocols::to_string(one.of)},
+                                 {"scale", to_string(one.scale)},
+                                 {"least", ranges[d].min},
+                                 {"most", ranges[d].max}});
+    out["own"][one.name] = next.point[d];
+  }
+  return out;
+}
+
+}  // namespace
+
+std::optional<Proposal> SocketAdvisor::ask(const protocols::Trial& next) {
   trouble_.clear();
   if (socket_ < 0 && !connect()) return std::nullopt;
   const auto& block = protocols::block_of(protocol_, next);
-  const std::vector<double> levels = protocols::levels_of(block);
   const auto until = steady_clock::now() + std::chrono::duration_cast<steady_clock::duration>(
                                                std::chrono::duration<double>(settings_.time_out));
   const CellName stimulus =
       cell_name(protocol_.stimuli[static_cast<std::size_t>(next.stimulus)].name);
   AdvisorJson factors = AdvisorJson::object();
   for (const auto& [factor, level] : stimulus.levels) factors[factor] = level;
-  const auto scale = protocols::scale_of(*protocols::procedure_of(block, next));
-  if (!send(line_of({{"type", "ask"},
-                     {"trial", next.trial},
-                     {"block", block.name},
-                     {"track", next.track},
-                     {"stimulus", stimulus.base},
-                     {"factors", factors},
-                     {"scale", to_string(*scale)},
-                     {"renderer", protocols::to_string(next.renderer)},
-                     {"path", block.level->pointer},
-                     {"least", levels.front()},
-                     {"most", levels.back()},
-                     {"own", *next.level}})))
-    return std::nullopt;
+  AdvisorJson question{{"type", "ask"},       {"trial", next.trial},       {"block", block.name},
+                       {"track", next.track}, {"stimulus", stimulus.base}, {"factors", factors}};
+  if (const auto scale = protocols::scale_of(*protocols::procedure_of(block, next)))
+    question["scale"] = to_string(*scale);
+  question["renderer"] = protocols::to_string(next.renderer);
+  question.update(range_json(block, next));
+  if (!send(line_of(question))) return std::nullopt;
   while (const std::optional<std::string> line = receive(until)) {
-    const std::optional<double> level = level_in(*line, next);
-    if (level) return level;
+    const std::optional<Proposal> proposal = proposal_in(*line, next);
+    if (proposal) return proposal;
     if (trouble_.empty()) continue;
     const std::string why = trouble_;
     if (send(refusal(why, next.trial))) trouble_ = why;

@@ -10,9 +10,18 @@
 //            {"type": "tell", TRIAL...}             after every trial of an adaptive block
 //            {"type": "refused", "trial": T, "message": TEXT}
 //   from it  {"type": "level", "trial": T, "level": X}
+//            {"type": "finished", "trial": T}       ends the block before that trial
+//
+// Where the level has several dimensions, "dimensions" takes the place of "path", "scale", "least"
+// and "most", and the answer is "levels":
+//
+//   to it    {"type": "ask", ..., "dimensions": [{"name": NAME, "path": POINTER, "of": "standard",
+//             "scale": "linear", "least": X, "most": Y}, ...], "own": {NAME: X, ...}}
+//   from it  {"type": "levels", "trial": T, "levels": {NAME: X, ...}}
 //
 // TRIAL: "trial", "block", "track", "level", "success", "correct", "answered", "catch_trial",
-// "response" and "response_time_s". "group" is null without groups, "response" without an answer.
+// "response" and "response_time_s"; of several dimensions "levels" beside a null "level". "group"
+// is null without groups, "response" without an answer. "trial" of "finished" may be left out.
 // Answers to earlier questions are ignored. A program that does not answer in time, or sends an
 // invalid line, is asked again before the next trial; after a closed connection or an overlong
 // line, the session connects again.
@@ -25,17 +34,26 @@
 #include "data/record.h"
 #include "protocols/protocol.h"
 #include "protocols/schedule.h"
+#include "runner/servo/device.h"
 
 namespace palpate::runner::session {
 
 // An external program that proposes the levels of adaptive blocks.
 
+/// What a program wants for the next trial: one of them.
+struct Proposal {
+  std::optional<double> level;
+  protocols::LevelPoint point = {};  ///< of several dimensions
+  bool finished = false;             ///< the block ends
+};
+
 class LevelAdvisor {
  public:
   virtual ~LevelAdvisor() = default;
-  /// Asks before a trial of an adaptive block, with forces off. \return the level to show, within
-  /// levels_of(block); nullopt: the block's own procedure continues, and trouble() has the reason
-  virtual std::optional<double> ask(const protocols::Trial& next) = 0;
+  /// Asks before a trial of an adaptive block, with forces off. \return what can be shown: a level
+  /// within levels_of(block), a point within ranges_of(block); nullopt: the block's own procedure
+  /// continues, and trouble() has the reason
+  virtual std::optional<Proposal> ask(const protocols::Trial& next) = 0;
   /// Reports a recorded trial of an adaptive block.
   virtual void tell(const data::TrialRecord& record) = 0;
   /// The reason that the last question had no answer; empty: it had one.
@@ -54,6 +72,7 @@ class SocketAdvisor final : public LevelAdvisor {
     double time_out = 1;  ///< s, for an answer
     int participant = 1;  ///< number
     int session = 1;
+    const servo::DeviceCapabilities* device = nullptr;  ///< that shows the points; null: any can
   };
   /// Connects. \param protocol  must outlive it. \param history  completed trials of the session.
   /// \throws std::invalid_argument: no program listens there
@@ -63,7 +82,7 @@ class SocketAdvisor final : public LevelAdvisor {
   SocketAdvisor(const SocketAdvisor&) = delete;
   SocketAdvisor& operator=(const SocketAdvisor&) = delete;
 
-  std::optional<double> ask(const protocols::Trial& next) override;
+  std::optional<Proposal> ask(const protocols::Trial& next) override;
   void tell(const data::TrialRecord& record) override;
   const std::string& trouble() const override { return trouble_; }
 
@@ -74,7 +93,9 @@ class SocketAdvisor final : public LevelAdvisor {
   bool send(const std::string& line);
   /// The next line; nullopt: none until then, and trouble_ has the reason.
   std::optional<std::string> receive(Deadline until);
-  std::optional<double> level_in(const std::string& line, const protocols::Trial& next);
+  std::optional<Proposal> proposal_in(const std::string& line, const protocols::Trial& next);
+  /// The reason against a point; "": none.
+  std::string fault_of(const protocols::LevelPoint& point, const protocols::Trial& next) const;
   std::string refusal(const std::string& message, int trial) const;
 
   const protocols::Protocol& protocol_;  ///< of the participant's group

@@ -103,6 +103,11 @@ Json block_json(const protocols::Protocol& protocol, const protocols::TaskBlock&
     if (std::ranges::find(shown, name) == shown.end()) shown.push_back(name);
   }
   if (!block.factors.empty()) out["cells"] = block.cell ? 1 : protocols::cells_of(block);
+  for (const protocols::LevelDimension& one : block.dimensions)
+    out["dimensions"].push_back({{"name", one.name},
+                                 {"path", one.target.pointer},
+                                 {"unit", protocols::unit_of_level(one.target.pointer)},
+                                 {"of", to_string(one.of)}});
   out["session"] = block.session;
   out["practice"] = block.practice;
   out["adaptive"] = protocols::is_adaptive(block);

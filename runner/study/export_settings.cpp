@@ -28,8 +28,16 @@ std::vector<data::BlockFacts> blocks_of(const nlohmann::ordered_json& protocol) 
     data::BlockFacts& facts = blocks.emplace_back();
     facts.name = text(block, "name");
     facts.task = text(block, "task");
-    if (const auto level = block.find("level"); level != block.end() && level->is_object())
+    if (const auto level = block.find("level"); level != block.end() && level->is_object()) {
       facts.level_path = text(*level, "path");
+      if (level->contains("dimensions") && (*level)["dimensions"].is_array()) {
+        for (const auto& one : (*level)["dimensions"]) {
+          if (!one.is_object()) continue;
+          const std::string path = text(one, "path");
+          facts.dimensions.push_back({text(one, "name"), path, protocols::unit_of_level(path)});
+        }
+      }
+    }
     if (!facts.level_path.empty()) facts.level_unit = protocols::unit_of_level(facts.level_path);
   }
   return blocks;

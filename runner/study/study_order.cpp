@@ -43,7 +43,8 @@ OrderRow row_of(const Protocol& protocol, const protocols::Trial& trial) {
                 trial.level,
                 trial.catch_trial,
                 comparison_interval(block, trial),
-                block.reaching ? protocols::to_string(trial.reach) : ""};
+                block.reaching ? protocols::to_string(trial.reach) : "",
+                trial.point};
   return row;
 }
 
@@ -107,9 +108,8 @@ std::string joined_in_order(const std::vector<std::string>& names) {
 
 /// Whether a program chooses the level of the next trial: any is as expected.
 bool is_level_asked(const protocols::SessionPlan& plan) {
-  if (!plan.tracks() || !plan.next().level) return false;
-  return std::holds_alternative<protocols::Asked>(
-      *protocols::procedure_of(plan.block(), plan.next()));
+  if (!plan.tracks() || plan.next().catch_trial) return false;
+  return protocols::is_asked(*protocols::procedure_of(plan.block(), plan.next()));
 }
 
 }  // namespace
@@ -119,10 +119,12 @@ std::string to_line(const OrderRow& row) {
   for (const double part : row.orientation_wxyz) line += "," + digits_of(part);
   if (!row.task) return line;
   const OrderRow::Task& task = *row.task;
-  return line + "," + std::to_string(task.block) + "," + task.name + "," +
-         std::to_string(task.track) + "," + (task.level ? digits_of(*task.level) : "") +
-         (task.catch_trial ? ",1," : ",0,") + std::to_string(task.comparison) +
-         (task.reach.empty() ? "" : "," + task.reach);
+  line += "," + std::to_string(task.block) + "," + task.name + "," + std::to_string(task.track) +
+          "," + (task.level ? digits_of(*task.level) : "") + (task.catch_trial ? ",1," : ",0,") +
+          std::to_string(task.comparison) + (task.reach.empty() ? "" : "," + task.reach);
+  if (!task.point.empty()) line += ",at";
+  for (const double value : task.point) line += "," + digits_of(value);
+  return line;
 }
 
 std::string fixed_order(const Protocol& all, int participant_number) {
@@ -146,11 +148,21 @@ ExpectedTrials expected_trials(const Protocol& all, int participant_number,
     protocols::SessionPlan plan(protocol, participant_number, session);
     for (const ShownTrial& one : shown) {
       if (one.row.session != session || plan.finished()) continue;
+      // A program may end the blocks that it chooses the levels for.
+      while (one.row.task && !plan.finished() && is_level_asked(plan) &&
+             plan.next().block < one.row.task->block)
+        plan.end_block();
+      if (plan.finished()) continue;
       if (!plan.next().practice) {
         out.rows.push_back(row_of(protocol, plan.next()));
-        if (one.row.task && is_level_asked(plan)) out.rows.back().task->level = one.row.task->level;
+        if (one.row.task && is_level_asked(plan)) {
+          out.rows.back().task->level = one.row.task->level;
+          out.rows.back().task->point = one.row.task->point;
+        }
       }
-      plan.answered(one.outcome);
+      protocols::TrialOutcome outcome = one.outcome;
+      outcome.block = 0;  // other blocks end as their procedures say
+      plan.answered(outcome);
     }
     out.complete = out.complete && plan.finished();
   }

@@ -26,8 +26,9 @@ struct OrderRow {
     int track = 1;
     std::optional<double> level;  ///< none: nothing is varied, or a catch trial
     bool catch_trial = false;
-    int comparison = 0;      ///< its interval, from 1; 0: none is compared
-    std::string reach = {};  ///< "field", "catch", "clamp"; "": no movement to a target
+    int comparison = 0;              ///< its interval, from 1; 0: none is compared
+    std::string reach = {};          ///< "field", "catch", "clamp"; "": no movement to a target
+    std::vector<double> point = {};  ///< of several dimensions, in place of `level`
     bool operator==(const Task&) const = default;
   };
   std::optional<Task> task = std::nullopt;
@@ -42,7 +43,8 @@ struct ShownTrial {
 };
 
 /// "session,renderer,shape,w,x,y,z" with 17 significant digits; of tasks followed by
-/// ",block,name,track,level,catch,comparison", of a movement to a target also ",field".
+/// ",block,name,track,level,catch,comparison", of a movement to a target also ",field", of a level
+/// of several dimensions ",at,VALUE,VALUE,...".
 std::string to_line(const OrderRow& row);
 
 /// Whatever is fixed for participant number 1, 2, ..., a line each: the trials for analysis; of

@@ -42,12 +42,36 @@ std::string shown_level(const ListedTrial& row) {
 
 using protocols::level_text;
 
+/// "300;350", in the order of the dimensions.
+std::string values_text(const protocols::LevelPoint& point) {
+  std::string text;
+  for (const double value : point) text += (text.empty() ? "" : ";") + level_text(value);
+  return text;
+}
+
+/// The dimensions of all blocks, each once.
+std::vector<std::string> dimensions_of(const protocols::Protocol& protocol) {
+  std::vector<std::string> names;
+  for (const protocols::TaskBlock& block : protocol.blocks) {
+    for (const protocols::LevelDimension& one : block.dimensions)
+      if (std::ranges::find(names, one.name) == names.end()) names.push_back(one.name);
+  }
+  return names;
+}
+
+/// The value of a trial's dimension; none: its block has no such dimension, or a catch trial.
+std::optional<double> value_of(const ListedTrial& row, const std::string& name) {
+  for (std::size_t d = 0; d < row.trial.point.size(); ++d)
+    if (row.block.dimensions[d].name == name) return row.trial.point[d];
+  return std::nullopt;
+}
+
 ListedTrial listed(const protocols::Protocol& protocol, const protocols::Trial& trial) {
   const auto& block = protocols::block_of(protocol, trial);
   return {trial,
           block,
           protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name,
-          trial.level ? protocols::level_text(*trial.level) : "",
+          trial.level ? protocols::level_text(*trial.level) : values_text(trial.point),
           comparison_interval(block, trial),
           protocols::is_adaptive(block),
           block.reaching ? to_string(trial.reach) : ""};
@@ -86,6 +110,8 @@ std::string csv_text(const protocols::Protocol& protocol, int participant,
     columns.emplace_back(more);
   for (const protocols::Factor& factor : protocol.factors) columns.push_back(factor.name);
   if (has_reaches(protocol)) columns.emplace_back("reach_kind");
+  const std::vector<std::string> dimensions = dimensions_of(protocol);
+  columns.insert(columns.end(), dimensions.begin(), dimensions.end());
   output::CsvText table(columns, "\r\n");
   for (const protocols::Trial& trial : trials) {
     const ListedTrial row = listed(protocol, trial);
@@ -93,12 +119,16 @@ std::string csv_text(const protocols::Protocol& protocol, int participant,
     table << participant << trial.session << trial.block << trial.trial
           << protocols::to_string(trial.renderer) << base_name(row.stimulus) << q.w << q.x << q.y
           << q.z << trial.practice << protocol.sha256 << PALPATE_VERSION
-          << protocols::to_string(row.block.task) << row.block.name << trial.track << row.level
-          << trial.catch_trial << (row.comparison > 0 ? std::to_string(row.comparison) : "")
-          << row.example;
+          << protocols::to_string(row.block.task) << row.block.name << trial.track
+          << (trial.level ? row.level : "") << trial.catch_trial
+          << (row.comparison > 0 ? std::to_string(row.comparison) : "") << row.example;
     for (const protocols::Factor& factor : protocol.factors)
       table << cell_name(row.stimulus).level(factor.name);
     if (has_reaches(protocol)) table << row.kind;
+    for (const std::string& name : dimensions) {
+      const auto value = value_of(row, name);
+      table << (value ? level_text(*value) : "");
+    }
     table.end_row();
   }
   return table.text();
@@ -127,6 +157,8 @@ std::string json_text(const protocols::Protocol& protocol, int participant,
     for (const auto& [factor, level] : cell_name(row.stimulus).levels)
       out["factors"][factor] = level;
     if (trial.level) out["level"] = *trial.level;
+    for (std::size_t d = 0; d < trial.point.size(); ++d)
+      out["levels"][row.block.dimensions[d].name] = trial.point[d];
     if (!row.kind.empty()) out["reach_kind"] = row.kind;
     if (row.comparison > 0) out["comparison_interval"] = row.comparison;
     rows.push_back(std::move(out));
@@ -151,7 +183,48 @@ std::string range_of(const std::vector<double>& values) {
   return std::to_string(values.size()) + " from " + level_text(*least) + " to " + level_text(*most);
 }
 
+/// "4 x 21" values, or the range of each dimension.
+std::string ranges_in_words(const protocols::ProcedureSpec& spec) {
+  std::string text;
+  for (const protocols::DimensionRange& range : protocols::ranges_of(spec))
+    text += (text.empty() ? "" : ", ") + level_text(range.min) + " to " + level_text(range.max);
+  return text;
+}
+
+std::string words(const protocols::SobolPoints& spec) {
+  return "Sobol's sequence: " + std::to_string(spec.trials) + " points within " +
+         ranges_in_words(spec);
+}
+
+std::string words(const protocols::AskedPoints& spec) {
+  return "a program is asked for points within " + ranges_in_words(spec) + " (--ask); ends after " +
+         std::to_string(spec.own.trials) + " trials";
+}
+
+std::string words(const protocols::FieldQuestPlus& spec) {
+  std::ostringstream out;
+  out << "QUEST+ of the form " << to_string(spec.function.form) << ": ";
+  for (const auto& values : spec.levels)
+    out << (&values == &spec.levels.front() ? "" : " x ") << values.size();
+  out << " points within " << ranges_in_words(spec) << "; ";
+  const std::vector<std::string> names = protocols::grid_names(spec.function.form);
+  for (std::size_t k = 0; k < names.size(); ++k)
+    out << (k > 0 ? ", " : "") << spec.parameters[k].values.size() << " of " << names[k];
+  if (std::ranges::find(spec.interest, false) != spec.interest.end()) {
+    out << "; of interest:";
+    for (std::size_t k = 0; k < names.size(); ++k)
+      if (spec.interest[k]) out << " " << names[k];
+  }
+  out << "; ends after " << spec.stop_trials << " trials";
+  if (spec.stop_entropy_bits)
+    out << " or at an entropy of " << level_text(*spec.stop_entropy_bits) << " bit";
+  return out.str();
+}
+
 std::string words(const protocols::ConstantStimuli& spec) {
+  if (!spec.points.empty())
+    return "constant stimuli: " + std::to_string(spec.points.size()) + " points within " +
+           ranges_in_words(spec) + ", each " + std::to_string(spec.repetitions) + " times";
   return "constant stimuli: levels " + range_of(spec.levels) + ", each " +
          std::to_string(spec.repetitions) + " times";
 }
@@ -193,6 +266,7 @@ std::string words(const protocols::Asked& spec) {
 bool succeeds(const protocols::Protocol& protocol, const protocols::TaskBlock& block,
               const protocols::Trial& trial, Random& random) {
   const double draw = random.unit();
+  if (!trial.point.empty()) return draw < protocols::typical_success(protocol, trial);
   if (!trial.level || protocols::levels_of(block).size() < 2) return draw < 0.75;
   const protocols::PsychometricParticipant typical =
       protocols::typical_participant(protocol, block);
@@ -226,8 +300,8 @@ protocols::PsychometricParticipant participant_for(const protocols::Protocol& pr
 }
 
 bool has_no_estimate(const protocols::ProcedureSpec& spec) {
-  return std::holds_alternative<protocols::ConstantStimuli>(spec) ||
-         std::holds_alternative<protocols::Asked>(spec);
+  return std::holds_alternative<protocols::ConstantStimuli>(spec) || protocols::is_asked(spec) ||
+         !protocols::ranges_of(spec).empty();
 }
 
 std::vector<RecoveredProcedure> recovered(const protocols::Protocol& protocol, int participants,
@@ -244,7 +318,8 @@ std::vector<RecoveredProcedure> recovered(const protocols::Protocol& protocol, i
   }
   if (all.empty())
     throw UsageError(
-        "--recover: expected a protocol of version 2 with a staircase, QUEST+ or limits");
+        "--recover: expected a protocol of version 2 with a staircase, QUEST+ or limits of one "
+        "dimension");
   return all;
 }
 
@@ -329,6 +404,11 @@ std::vector<std::string> in_words(const protocols::Protocol& protocol,
   if (block.task == protocols::TaskKind::compare)
     head += ", " + std::to_string(block.intervals) + " intervals";
   if (block.level) head += "; " + block.level->pointer + " varies";
+  for (const protocols::LevelDimension& one : block.dimensions)
+    head += (&one == &block.dimensions.front() ? "; " : ", ") + one.name + " (" +
+            one.target.pointer + (block.standard ? std::string(" of ") + to_string(one.of) : "") +
+            ")";
+  if (!block.dimensions.empty()) head += " vary";
   if (block.cell) {
     const CellName cell = cell_name(name(block.stimuli.front()));
     for (const auto& [factor, level] : cell.levels) head += "; " + factor + " " + level;

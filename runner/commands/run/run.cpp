@@ -377,7 +377,7 @@ int run_command(const std::vector<std::string>& args) {
   if (!settings.advisor.empty())
     advisor.emplace(protocol,
                     session::SocketAdvisor::Settings{settings.advisor, settings.advisor_time_out,
-                                                     participant.enrolled_number, session},
+                                                     participant.enrolled_number, session, &device},
                     progress.completed);
   std::optional<session::StreamedServo> streamed;
   if (stream) streamed.emplace(servo, *stream);

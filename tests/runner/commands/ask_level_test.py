@@ -244,16 +244,20 @@ import json
 
 class AEPsychClient:
     def __init__(self, ip, port):
-        self.calls, self.asked = open("calls.jsonl", "a", buffering=1), {}
+        self.calls, self.asked, self.configs = open("calls.jsonl", "a", buffering=1), {}, {}
     def note(self, **call):
         self.calls.write(json.dumps(call) + chr(10))
     def configure(self, config_str, config_name):
+        self.configs[config_name] = config_str
         self.note(configure=config_str, name=config_name)
     def resume(self, config_name):
         self.name = config_name
     def ask(self):
-        self.asked[self.name] = self.asked.get(self.name, 0) + 1
-        return {"config": {"level": [2.5 + self.asked[self.name] / 100]}, "is_finished": False, "num_points": 1}
+        n = self.asked[self.name] = self.asked.get(self.name, 0) + 1
+        config = self.configs[self.name]
+        names = config.split("parnames = [")[1].split("]")[0].split(", ")
+        wanted = int(config.split("min_asks = ")[2].split(chr(10))[0])
+        return {"config": {name: [2.5 + n / 100] for name in names}, "is_finished": n >= wanted, "num_points": 1}
     def tell(self, config, outcome):
         self.note(tell=config, outcome=outcome, name=self.name)
 """
@@ -318,6 +322,114 @@ class AskProcedure(Asking):
         self.assertEqual([call["outcome"] for call in told], [int(row["success"]) for row in rows])
         for call, row in zip(told, rows, strict=True):
             self.assertAlmostEqual(call["tell"]["level"][0], math.log10(float(row["level"])))
+
+
+POINTS = {**PROTOCOL, "name": "points", "stimuli": [{**PROTOCOL["stimuli"][0], "texture": {"kind": "sine", "period_m": 0.002, "depth_m": 0.0002}}],
+          "blocks": [
+    {"name": "field", "task": "compare", "stimuli": ["ball"], "standard": "ball",
+     "level": {"dimensions": [{"name": "reference", "path": "/stiffness_n_per_m", "of": "standard"},
+                              {"name": "stiff-ness", "path": "/stiffness_n_per_m", "scale": "log"}]},
+     "procedure": {"kind": "ask", "ranges": {"reference": {"min": 200, "max": 400}, "stiff-ness": {"min": 100, "max": 600}},
+                   "stop": {"trials": TRIALS}}},
+    {"name": "later", "task": "compare", "stimuli": ["ball"], "standard": "ball", "level": {"path": "/stiffness_n_per_m"},
+     "procedure": {"kind": "staircase", "start": 500, "min": 300, "max": 600, "steps": [50], "down": 2, "stop": {"trials": 4}}}]}
+
+
+def levels_of(message, **values):
+    return (json.dumps({"type": "levels", "trial": message["trial"], "levels": values}) + "\n").encode()
+
+
+class AskDimensions(Asking):
+    def setUp(self):
+        super().setUp()
+        self.protocol = self.file("points.json", POINTS)
+
+    def points(self, db):
+        return [(float(row["reference"]), float(row["stiff-ness"])) for row in self.exported(db)[1] if row["block_name"] == "field"]
+
+    def test_points_are_requested_presented_and_reported(self):
+        program, db = self.asked(lambda message: level(message, 400) if "path" in message else
+                                 levels_of(message, **{"reference": 200 + message["trial"], "stiff-ness": 300.5}))
+        asked = [message for message in program.of("ask") if "dimensions" in message]
+        self.assertEqual(self.points(db), [(200 + message["trial"], 300.5) for message in asked])
+        self.assertEqual(len(asked), TRIALS)
+        self.assertEqual(asked[0]["dimensions"], [
+            {"name": "reference", "path": "/stiffness_n_per_m", "of": "standard", "scale": "linear", "least": 200, "most": 400},
+            {"name": "stiff-ness", "path": "/stiffness_n_per_m", "of": "comparison", "scale": "log", "least": 100, "most": 600}])
+        self.assertEqual(set(asked[0]["own"]), {"reference", "stiff-ness"})
+        self.assertFalse({"path", "least", "most", "scale"} & set(asked[0]))
+        told = [message for message in program.of("tell") if message["block"] == "field"]
+        self.assertEqual([tuple(message["levels"].values()) for message in told], self.points(db))
+        self.assertEqual({message["level"] for message in told}, {None})
+        self.assertEqual(self.events(db), [])
+
+    def test_invalid_points_are_named_and_replaced(self):
+        good = {"reference": 300, "stiff-ness": 300}
+        cases = [({"reference": 300}, "'stiff-ness' from 100 to 600: it is missing"),
+                 ({**good, "hardness": 3}, "no level for 'hardness'"),
+                 ({**good, "reference": 199}, "'reference' from 200 to 400"),
+                 ({**good, "stiff-ness": float("nan")}, "expected"),
+                 ({**good, "stiff-ness": "300"}, "'stiff-ness' from 100 to 600"),
+                 (None, "an object with a number for each dimension")]
+        wanted = iter(cases)
+
+        def reply(message):
+            if "path" in message:
+                return None
+            case = next(wanted, None)
+            values = good if case is None else case[0]
+            return (json.dumps({"type": "levels", "trial": message["trial"], "levels": values}) + "\n").encode()
+        program, db = self.asked(reply, time_out=1)
+        refused = [message["message"] for message in program.of("refused")][:len(cases)]
+        for text, (_, expected) in zip(refused, cases, strict=True):
+            self.assertIn(expected, text)
+        asked = [message for message in program.of("ask") if "dimensions" in message]
+        for point, message in list(zip(self.points(db), asked, strict=True))[:len(cases)]:
+            self.assertEqual(point, tuple(message["own"].values()))
+        self.assertEqual(self.points(db)[len(cases):], [(300, 300)] * (TRIALS - len(cases)))
+        events = [event for event in self.events(db) if "levels" in event]
+        self.assertEqual([event["levels"] for event in events], [message["own"] for message in asked[:len(cases)]])
+
+    def test_a_program_ends_a_block(self):
+        for protocol, block in ((POINTS, "field"), (PROTOCOL, "stairs")):
+            self.protocol = self.file("ended.json", {**protocol, "name": "ended-" + block})
+            program = self.program(lambda message: b'{"type": "finished"}\n' if message["trial"] > 7 and message["block"] == block else None)
+            db = self.dir / (block + ".db")
+            self.simulate(db, "--ask", self.dir / "socket", "--ask-time-out-s", 0.3)
+            program.server.close()
+            (self.dir / "socket").unlink()
+            rows = self.exported(db)[1]
+            self.assertEqual(sum(row["block_name"] == block for row in rows), 7 - 4 * (block == "stairs"))
+            with sqlite3.connect(db) as base:
+                notes = [json.loads(text) for (text,) in base.execute("SELECT text FROM notes") if "block_ended_by_program" in text]
+            base.close()
+            self.assertEqual(notes, [{"block_ended_by_program": {"session": 1, "block": block, "before_trial": 8}}])
+            if block == "field":
+                self.assertEqual(sum(row["block_name"] == "later" for row in rows), 4)
+                self.simulate(db)  # nothing is left
+                self.assertEqual(self.exported(db)[1], rows)
+
+    def test_aepsych_chooses_points(self):
+        (self.dir / "aepsych_client.py").write_text(STUB)
+        path = self.dir / "socket"
+        example = pathlib.Path(EXAMPLE).parent / "aepsych_levels.py"
+        program = subprocess.Popen([sys.executable, example, path, "--first", "2", "--asks", "5"], cwd=self.dir,
+                                   env={**os.environ, "PYTHONPATH": str(self.dir)})
+        self.addCleanup(program.wait)
+        self.addCleanup(program.kill)
+        while not path.is_socket():
+            time.sleep(0.02)
+        db = self.dir / "a.db"
+        self.simulate(db, "--ask", path, "--ask-time-out-s", 20)
+        calls = [json.loads(line) for line in (self.dir / "calls.jsonl").read_text().splitlines()]
+        configured = next(call for call in calls if "configure" in call)["configure"]
+        self.assertIn("parnames = [reference, stiff_ness]", configured)
+        self.assertIn("lower_bound = 2.0\n", configured.split("[stiff_ness]")[1])
+        points = self.points(db)
+        self.assertEqual(len(points), 5)  # the program ended the block
+        self.assertEqual([round(math.log10(stiff), 9) for _, stiff in points], [round(2.5 + n / 100, 9) for n in range(1, 6)])
+        told = [call for call in calls if "tell" in call and "reference" in call["tell"]]
+        self.assertEqual(len(told), 5)
 
 
 if __name__ == "__main__":
