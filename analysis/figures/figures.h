@@ -143,6 +143,11 @@ constexpr std::size_t kShownParticipants = 200;
 /// reversals of a staircase. Participants beyond the first 12 are left out, with a note.
 std::vector<Figure> task_figures(const StudyAnalysis& analysis);
 
+/// For each stimulus in a block whose level has several dimensions: "field1", ...: a panel for each
+/// renderer with what the form says of every participant (JND over the standard, threshold over x2,
+/// shift over a conflict), the same from the trials at each place alone, and the mean.
+std::vector<Figure> field_figures(const StudyAnalysis& analysis);
+
 /// For each stimulus in a block of a study with groups, and for identification, "between1", ...: a
 /// panel for each measure with the means of the groups under each renderer
 /// with their intervals, and every participant.

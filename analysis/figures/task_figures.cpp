@@ -828,6 +828,7 @@ std::vector<Figure> task_figures(const StudyAnalysis& analysis) {
   add_rating_figures(analysis, figures);
   add_magnitude_figures(analysis, figures);
   add_reach_figures(analysis, figures);
+  for (Figure& figure : field_figures(analysis)) figures.push_back(std::move(figure));
   std::size_t number = 0;
   for (const TaskCell& cell : analysis.cells) {
     if (cell.functions.empty()) continue;

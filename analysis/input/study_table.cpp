@@ -229,7 +229,21 @@ std::optional<data::ReachRecord> read_reach(TaskRow& row) {
   return reach;
 }
 
-StudyTrial read_trial(TaskRow& row, const std::vector<std::string>& factors) {
+/// The dimensions of a block's level, by its name; those of several protocols follow each other.
+using BlockDimensions = std::map<std::string, std::vector<std::string>>;
+
+BlockDimensions dimensions_of(const std::vector<ProtocolText>& protocols) {
+  BlockDimensions out;
+  for (const ProtocolText& one : protocols) {
+    for (const data::StoredBlock& block : data::read_stored_protocol(one.text).blocks) {
+      for (const std::string& name : block.dimensions) note_once(name, out[block.name]);
+    }
+  }
+  return out;
+}
+
+StudyTrial read_trial(TaskRow& row, const std::vector<std::string>& factors,
+                      const BlockDimensions& dimensions) {
   StudyTrial trial;
   trial.participant = row.text("participant_id");
   trial.task = row.value("task");
@@ -245,6 +259,12 @@ StudyTrial read_trial(TaskRow& row, const std::vector<std::string>& factors) {
   trial.response = trial.task == "identify" ? row.text("response") : row.value("response");
   trial.level = row.number("level");
   trial.standard_level = row.number("standard_level");
+  if (const auto own = dimensions.find(trial.block_name); own != dimensions.end()) {
+    for (const std::string& name : own->second) {
+      if (!row.has(name.c_str())) continue;
+      if (const auto value = row.number(name.c_str())) trial.dimensions.emplace_back(name, *value);
+    }
+  }
   trial.number = row.number("number");
   take_rated_number(trial);
   trial.confidence = row.number("confidence");
@@ -419,11 +439,17 @@ StudyTable read_tasks_csv(const std::string& path, const std::vector<std::string
   std::vector<std::string> found, twice;
   const Columns columns = read_header(reader, &twice);
   const std::vector<std::string> factors = factor_columns(columns, protocols);
+  const BlockDimensions dimensions = dimensions_of(protocols);
   const std::size_t n_fields = reader.fields().size();
   faults.reserve(twice.size());
   for (const std::string& name : twice)
     faults.push_back({path, "line 1", "expected each column once; " + name + " comes again"});
-  for (const auto& [name, place] : columns) found.push_back(name);
+  for (const auto& [name, place] : columns) {
+    const bool read = std::ranges::any_of(dimensions, [&](const auto& block) {
+      return std::ranges::find(block.second, name) != block.second.end();
+    });
+    if (!read) found.push_back(name);
+  }
   const std::vector<AlikeColumn> alike = alike_columns(found, kTaskColumns);
   for (const char* needed : {"participant_id", "task", "renderer", "shape", "response"}) {
     if (columns.count(needed) == 0)
@@ -460,7 +486,7 @@ StudyTable read_tasks_csv(const std::string& path, const std::vector<std::string
       ++table.n_practice;
       continue;
     }
-    table.trials.push_back(read_trial(row, factors));
+    table.trials.push_back(read_trial(row, factors, dimensions));
     StudyTrial& trial = table.trials.back();
     trial.simulated = simulated;
     if (!row.value("group").empty()) {
@@ -644,6 +670,7 @@ StudyTrial study_trial_of(const std::string& participant, const data::TrialRecor
   trial.track = std::to_string(record.task.track);
   trial.level = record.task.level;
   trial.standard_level = record.task.standard_level;
+  trial.dimensions = record.task.dimensions;
   trial.number = record.task.number;
   trial.confidence = record.task.confidence;
   trial.reach = record.task.reach;

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "data/record.h"
@@ -17,6 +18,8 @@ struct StudyTrial {
   std::string track;
   std::string group;  ///< of the participant; "": none, or unknown
   std::optional<double> level, standard_level, number, confidence;
+  /// Of a level of several dimensions, in the protocol's order: name and value. Empty: none.
+  std::vector<std::pair<std::string, double>> dimensions = {};
   bool catch_trial = false, success = false, answered = false;
   std::optional<bool> correct;  ///< none: no answer is right or wrong
   int participant_number = 0;   ///< orders the trials; 0: unknown

@@ -263,6 +263,65 @@ TaskJson reaches_json(const TaskCell& cell, const Reaches& one) {
   return out;
 }
 
+TaskJson misfit_json(const FieldMisfit& misfit) {
+  TaskJson out;
+  put_status(out, misfit.undefined);
+  if (!misfit.undefined.empty()) return out;
+  out["deviance"] = misfit.deviance;
+  out["df"] = misfit.df;
+  out["p"] = misfit.p;
+  for (const FieldMisfit::Place& place : misfit.places)
+    out["places"].push_back({{"at", place.at},
+                             {"n_trials", place.trials},
+                             {"free", finite(place.free)},
+                             {"fitted", finite(place.fitted)}});
+  return out;
+}
+
+TaskJson field_participant_json(const ParticipantField& one) {
+  TaskJson out{{"participant_id", one.participant}, {"n_trials", one.fit.trials}};
+  put_status(out, one.fit.undefined);
+  if (!one.fit.undefined.empty()) return out;
+  const auto put = [&](TaskJson& place, const FieldParameter& parameter) {
+    place = {{"estimate", finite(parameter.value)},
+             {"ci95", ends_json(parameter.ci95)},
+             {"determined", parameter.closed}};
+  };
+  for (const FieldParameter& parameter : one.fit.parameters)
+    put(out["parameters"][parameter.name], parameter);
+  if (one.fit.jnd) {
+    put(out["jnd"], *one.fit.jnd);
+    out["jnd"]["standard"] = one.fit.middle;
+  }
+  out["log_likelihood"] = one.fit.log_likelihood;
+  out["misfit"] = misfit_json(one.fit.misfit);
+  return out;
+}
+
+TaskJson field_json(const FieldAnalysis& field) {
+  TaskJson out{{"dimensions", TaskJson::array()}};
+  for (const FieldAnalysis::Dimension& one : field.dimensions)
+    out["dimensions"].push_back({{"name", one.name}, {"unit", one.unit}});
+  put_status(out, field.undefined);
+  if (!field.undefined.empty()) return out;
+  out["form"] = to_string(field.function.form);
+  out["participants"] = TaskJson::array();
+  for (const ParticipantField& one : field.participants)
+    out["participants"].push_back(field_participant_json(one));
+  out["misfit"] = {{"n_participants", field.tested},
+                   {"deviance", field.deviance},
+                   {"df", field.df},
+                   {"p", maybe(field.p)},
+                   {"is", field.has_jnd() ? "natural logarithm of ratios" : "difference"},
+                   {"places", TaskJson::array()}};
+  for (const MisfitPlace& place : field.places)
+    out["misfit"]["places"].push_back({{"at", place.at},
+                                       {"n_participants", place.participants},
+                                       {"mean", place.mean},
+                                       {"ci95", ends_json(place.ci95)}});
+  return out;
+}
+
 TaskJson cell_json(const TaskCell& cell) {
   TaskJson out{{"task", cell.task},
                {"block_name", cell.block_name},
@@ -293,6 +352,7 @@ TaskJson cell_json(const TaskCell& cell) {
                                   {"sd", maybe(one.sd)},
                                   {"jnd", maybe(one.jnd)},
                                   {"start_effect", maybe(one.start_effect)}});
+  if (cell.field) out["field"] = field_json(*cell.field);
   for (const Reaches& one : cell.reaches) out["reaches"].push_back(reaches_json(cell, one));
   if (cell.information) {
     TaskJson& bits = out["information_transfer"] = information_json(*cell.information);

@@ -195,6 +195,59 @@ std::string reaches_text(const TaskCell& cell) {
   return text;
 }
 
+std::string parameter_text(const FieldParameter& one) {
+  const bool rate = one.name == "lapse" || one.name == "guess";
+  const auto shown = [&](double value) { return rate ? rounded_rate(value) : value; };
+  return one.name + " " +
+         with_interval(shown(one.value), {shown(one.ci95.low), shown(one.ci95.high)});
+}
+
+std::string misfit_text(double deviance, int df, double p) {
+  return (p < kMisfitLevel ? "MISFIT: deviance " : "form: deviance ") + short_number(deviance) +
+         " on " + counted(static_cast<std::size_t>(df), "degree", "degrees") + " of freedom, " +
+         p_phrase(p);
+}
+
+std::string field_text(const FieldAnalysis& field) {
+  if (!field.undefined.empty()) return "  " + field.undefined + "\n";
+  std::string text = "  form " + std::string(to_string(field.function.form)) + " of";
+  for (const FieldAnalysis::Dimension& one : field.dimensions)
+    text += (&one == &field.dimensions.front() ? " " : ", ") + printable(one.name) +
+            (one.unit == "1" ? "" : " (" + printable(one.unit) + ")");
+  text += "\n";
+  for (const ParticipantField& one : field.participants) {
+    text += "  " + pad_right(printable(one.participant), 12);
+    if (!one.fit.undefined.empty()) {
+      text += "no function: " + one.fit.undefined + "\n";
+      continue;
+    }
+    for (const FieldParameter& parameter : one.fit.parameters)
+      text += (&parameter == &one.fit.parameters.front() ? "" : ", ") + parameter_text(parameter);
+    if (one.fit.jnd)
+      text += "; JND at " + short_number(one.fit.middle) + " " +
+              with_interval(one.fit.jnd->value, one.fit.jnd->ci95);
+    const FieldMisfit& misfit = one.fit.misfit;
+    text += "; " + (misfit.undefined.empty() ? misfit_text(misfit.deviance, misfit.df, misfit.p)
+                                             : "form not tested: " + misfit.undefined);
+    text += "\n";
+  }
+  if (field.p) {
+    text += "  over " + counted(field.tested, "participant", "participants") + ": " +
+            misfit_text(field.deviance, field.df, *field.p) +
+            (*field.p < kMisfitLevel ? ": the form does NOT hold, and its parameters mean less\n"
+                                     : "\n");
+    for (const MisfitPlace& place : field.places) {
+      const auto shown = [&](double value) { return field.has_jnd() ? std::exp(value) : value; };
+      text += "    at " + short_number(place.at) + ": ";
+      text += place.ci95 ? with_interval(shown(place.mean),
+                                         {shown(place.ci95->low), shown(place.ci95->high)})
+                         : short_number(shown(place.mean));
+      text += field.has_jnd() ? " times the JND of the form\n" : " from the form\n";
+    }
+  }
+  return text;
+}
+
 std::string cell_text(const TaskCell& cell) {
   std::string text = cell.task;
   for (const std::string* name : {&cell.block_name, &cell.shape, &cell.renderer}) {
@@ -214,6 +267,7 @@ std::string cell_text(const TaskCell& cell) {
         "  successes fall as the level rises; no protocol states which direction was asked for\n";
   for (const ParticipantFunction& one : cell.functions)
     text += function_text(one, cell.expected_easier);
+  if (cell.field) text += field_text(*cell.field);
   if (cell.magnitude) text += magnitude_text(cell);
   if (cell.ratings) text += ratings_text(cell);
   text += adjustment_text(cell);
@@ -294,8 +348,10 @@ std::string comparison_text(const TaskComparison& one, bool of_renderers) {
   if (!one.comparison.undefined.empty()) text += "  " + one.comparison.undefined + "\n";
   if (one.n_undetermined > 0)
     text += "  " + counted(one.n_undetermined, "function", "functions") +
-            " left out: no threshold among the levels shown, a slope too steep for them, or "
-            "reversed answers\n";
+            (is_field_parameter(one.measure)
+                 ? " left out: the answers leave an end of the interval open\n"
+                 : " left out: no threshold among the levels shown, a slope too steep for them, "
+                   "or reversed answers\n");
   for (const ConditionDifference& difference : one.comparison.differences) {
     const auto shown = [&](double value) {
       return short_number(one.logarithms ? std::exp(value) : value);

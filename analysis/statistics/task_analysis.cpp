@@ -643,10 +643,14 @@ TaskCell cell_of(const CellKey& key, const Trials& trials, const Context& contex
   }
   for (const auto& [participant, own] : by_participant(trials))
     cell.participants.push_back(participant);
-  if (const auto* block = block_of(*trials.front(), context.table)) {
-    if (block->level_unit != "1") cell.level_unit = block->level_unit;
+  if (const auto* known = block_of(*trials.front(), context.table)) {
+    if (known->level_unit != "1") cell.level_unit = known->level_unit;
   }
-  if (cell.task == "compare" || cell.task == "detect") add_functions(cell, trials, context);
+  const auto* const block = block_of(*trials.front(), context.table);
+  const bool several = block != nullptr && !block->dimensions.empty();
+  if (several && cell.task != "rate") cell.field = analyze_field(trials, *block);
+  if (!several && (cell.task == "compare" || cell.task == "detect"))
+    add_functions(cell, trials, context);
   if (cell.task == "rate" && !add_ratings(cell, trials, context.table)) add_magnitude(cell, trials);
   if (cell.task == "adjust") add_adjustments(cell, trials);
   if (cell.task == "reach") add_reaches(cell, trials);

@@ -10,6 +10,7 @@
 #include "analysis/input/study_table.h"
 #include "analysis/statistics/analysis.h"
 #include "analysis/statistics/discrimination.h"
+#include "analysis/statistics/field_analysis.h"
 #include "analysis/statistics/mixed_model.h"
 #include "analysis/statistics/paired.h"
 #include "analysis/statistics/psychometric_fit.h"
@@ -203,6 +204,7 @@ struct TaskCell {
   std::optional<Ratings> ratings;                  ///< rate: labelled steps, or without levels
   std::vector<Adjustment> adjustments;             ///< adjust
   std::vector<Reaches> reaches;                    ///< reach
+  std::optional<FieldAnalysis> field;              ///< levels of several dimensions
   std::optional<InformationTransfer> information;  ///< identify: over all its stimuli, pooled
   std::vector<InformationTransfer> informations;   ///< of each participant
   double information_most = 0;  ///< log2 of the number of stimuli or of answers, the lesser, bit

@@ -250,6 +250,29 @@ Figures learning_trials(const TaskCell& cell) {
   return figures;
 }
 
+/// A parameter of the functions of several dimensions.
+Figures of_fields(const TaskCell& cell, const std::string& name) {
+  Figures figures;
+  figures.ratios = name == "w" || name == "s" || name == "slope" || name == "jnd";
+  if (!cell.field || !cell.field->undefined.empty()) return figures;
+  figures.ratios &= !(name == "w" && cell.field->function.form == protocols::FieldForm::cues);
+  for (const ParticipantField& one : cell.field->participants) {
+    const FieldParameter* found = name == "jnd" && one.fit.jnd ? &*one.fit.jnd : nullptr;
+    for (const FieldParameter& parameter : one.fit.parameters)
+      if (parameter.name == name) found = &parameter;
+    if (found == nullptr) continue;
+    if (found->closed)
+      figures.add(one.participant, found->value);
+    else
+      ++figures.n_undetermined;
+  }
+  return figures;
+}
+
+std::function<Figures(const TaskCell&)> field_parameter(const char* name) {
+  return [name](const TaskCell& cell) { return of_fields(cell, name); };
+}
+
 constexpr const char* kRating = "rating";
 
 /// The compared measures. Weber fractions are left out: they are JNDs over the same standard.
@@ -264,7 +287,14 @@ std::vector<Measure> measures() {
           {"deviation", deviations, "m"},
           {"aftereffect", aftereffects, "m"},
           {"adaptation", adaptations, ""},
-          {"learning_trials", learning_trials, "trials"}};
+          {"learning_trials", learning_trials, "trials"},
+          {"jnd", field_parameter("jnd")},
+          {"w", field_parameter("w")},
+          {"c", field_parameter("c")},
+          {"a", field_parameter("a")},
+          {"b", field_parameter("b")},
+          {"s", field_parameter("s")},
+          {"slope", field_parameter("slope")}};
 }
 
 void add_mean(GroupMean& group, bool geometric) {
@@ -298,6 +328,8 @@ std::optional<TaskGroup> group_of(const std::vector<const TaskCell*>& cells,
     }
     if (measure.unit != nullptr)
       result.unit = measure.unit;
+    else if (cell->field)
+      result.unit = unit_of_parameter(*cell->field, name);
     else if (name != "exponent" && name != "weber_fraction")
       result.unit = cell->level_unit;
   }
@@ -452,6 +484,11 @@ ThresholdComparison compare_thresholds(const std::vector<ParticipantFigure>& fig
   return result;
 }
 
+bool is_field_parameter(const std::string& measure) {
+  return measure == "w" || measure == "c" || measure == "a" || measure == "b" || measure == "s" ||
+         measure == "slope";
+}
+
 std::string measure_plural(const std::string& measure) {
   if (measure == "threshold") return "Thresholds";
   if (measure == "jnd") return "JNDs";
@@ -463,7 +500,8 @@ std::string measure_plural(const std::string& measure) {
   if (measure == "aftereffect") return "Aftereffects";
   if (measure == "adaptation") return "Adaptations";
   if (measure == "learning_trials") return "Learning times";
-  return measure == "pse" ? "PSEs" : "Exponents";
+  if (measure == "pse") return "PSEs";
+  return measure == "exponent" ? "Exponents" : measure + " values";
 }
 
 std::vector<TaskGroup> group_results(const std::vector<TaskCell>& cells) {

@@ -72,8 +72,10 @@ struct GroupMean {
 /// A measure of a stimulus in a block, with each renderer.
 struct TaskGroup {
   std::string task, block_name, shape;
-  std::string measure;  ///< "threshold", "pse", "jnd", "weber_fraction", "exponent", "rating"
-  std::string unit;     ///< "N/m", ...; "": unknown, or without unit
+  /// "threshold", "pse", "jnd", "weber_fraction", "exponent", "rating"; of a level of several
+  /// dimensions its parameters, "w", "c", ...
+  std::string measure;
+  std::string unit;  ///< "N/m", ...; "": unknown, or without unit
   /// Means are geometric if all figures are positive and have a true zero, except for exponents.
   bool geometric = false;
   std::vector<GroupMean> renderers;  ///< point, ray, then others in order of their first trial
@@ -94,7 +96,10 @@ struct TaskComparison {
   ThresholdComparison comparison;
 };
 
-/// "Thresholds", "PSEs", "JNDs", "Weber fractions", "Exponents", "Mean ratings".
+/// Whether a measure is a parameter of a function of several dimensions: "w", "c", ...
+bool is_field_parameter(const std::string& measure);
+
+/// "Thresholds", "PSEs", "JNDs", "Weber fractions", "Exponents", "Mean ratings", "w values".
 std::string measure_plural(const std::string& measure);
 
 /// Means over participants, for each measure with a value.

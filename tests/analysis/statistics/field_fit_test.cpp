@@ -1,0 +1,193 @@
+// Functions of several dimensions fitted to answers of a known function.
+
+#include "analysis/statistics/field_fit.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "data/base/random.h"
+
+namespace palpate::analysis {
+namespace {
+
+using protocols::FieldForm;
+using protocols::FieldFunction;
+
+constexpr double kStandards[] = {20, 60, 200, 600, 2000};
+
+/// Answers at random comparisons within some JNDs of five standards.
+std::vector<PointCount> answers_of(const FieldFunction& truth, const std::vector<double>& values,
+                                   int trials, std::uint64_t seed) {
+  Random random(seed);
+  std::vector<PointCount> counts;
+  for (int i = 0; i < trials; ++i) {
+    const double standard = kStandards[i % 5];
+    const double jnd = protocols::field_jnd(truth.form, values, standard);
+    const double x = std::round(10 * (standard + jnd * (5 * random.unit() - 2.5))) / 10;
+    const protocols::LevelPoint point{standard, x};
+    const bool success = random.unit() < field_success(truth, values, point);
+    counts.push_back({point, 1, success ? 1 : 0});
+  }
+  return sum_by_point(std::move(counts));
+}
+
+const FieldParameter& parameter(const FieldFit& fit, const std::string& name) {
+  for (const FieldParameter& one : fit.parameters)
+    if (one.name == name) return one;
+  throw std::out_of_range(name);
+}
+
+bool holds(const FieldParameter& one, double truth) {
+  return one.ci95.low <= truth && truth <= one.ci95.high;
+}
+
+TEST(FieldFit, IntervalsHoldTheTruth) {
+  int held_w = 0, held_c = 0, held_jnd = 0;
+  constexpr int kPeople = 30;
+  FieldModel model;
+  model.middle = 200;
+  for (int person = 0; person < kPeople; ++person) {
+    const auto counts = answers_of({}, {0.12, 60, 0.02}, 300, 100 + person);
+    const FieldFit fit = fit_field(counts, model);
+    ASSERT_EQ(fit.undefined, "");
+    held_w += holds(parameter(fit, "w"), 0.12) ? 1 : 0;
+    held_c += holds(parameter(fit, "c"), 60) ? 1 : 0;
+    held_jnd += holds(*fit.jnd, 0.12 * 260) ? 1 : 0;
+    EXPECT_NEAR(fit.jnd->value, parameter(fit, "w").value * (200 + parameter(fit, "c").value),
+                1e-6);
+  }
+  // 95 %: fewer than 25 of 30 would come by chance in one of 200 tests.
+  EXPECT_GE(held_w, 25);
+  EXPECT_GE(held_c, 25);
+  EXPECT_GE(held_jnd, 25);
+}
+
+// Brute force: no other parameters on a fine grid are likelier.
+TEST(FieldFit, NoPlaceOfAGridIsLikelier) {
+  const FieldFunction truth;
+  const auto counts = answers_of(truth, {0.12, 60, 0.02}, 200, 9);
+  const FieldFit fit = fit_field(counts, {});
+  const auto log_likelihood = [&](double w, double c, double lapse) {
+    double sum = 0;
+    for (const PointCount& count : counts) {
+      const double z =
+          0.6744897501960817 * (count.point[1] - count.point[0]) / (w * (count.point[0] + c));
+      const double p = lapse + (1 - 2 * lapse) * 0.5 * std::erfc(-z / std::sqrt(2.0));
+      sum += count.successes * std::log(p) + (count.trials - count.successes) * std::log(1 - p);
+    }
+    return sum;
+  };
+  double most = -1e9;
+  for (int i = 0; i < 60; ++i)
+    for (int k = 0; k < 60; ++k)
+      for (const double lapse : {1e-6, 0.01, 0.02, 0.03, 0.045, 0.06})
+        most = std::max(most, log_likelihood(0.05 + 0.005 * i, -15 + 5 * k, lapse));
+  EXPECT_GE(fit.log_likelihood, most - 1e-6);
+  EXPECT_NEAR(fit.log_likelihood,
+              log_likelihood(parameter(fit, "w").value, parameter(fit, "c").value,
+                             std::max(fit.lapse, 1e-12)),
+              1e-4);
+}
+
+/// Deviance and degrees of freedom over people whose JND is a power of the standard, or Weber's
+/// law.
+FieldMisfit summed_misfit(FieldForm form, const std::vector<double>& values) {
+  FieldMisfit sum;
+  for (std::uint64_t person = 0; person < 12; ++person) {
+    FieldFunction truth;
+    truth.form = form;
+    const FieldFit fit = fit_field(answers_of(truth, values, 400, 40 + person), {});
+    EXPECT_EQ(fit.misfit.undefined, "");
+    EXPECT_EQ(fit.misfit.df, 3);
+    sum.deviance += fit.misfit.deviance;
+    sum.df += fit.misfit.df;
+  }
+  return sum;
+}
+
+TEST(FieldFit, APowerLawDoesNotFitWebersLaw) {
+  const FieldMisfit wrong = summed_misfit(FieldForm::power, {1, 0.7, 0.02});
+  const FieldMisfit right = summed_misfit(FieldForm::weber, {0.12, 60, 0.02});
+  ASSERT_EQ(wrong.df, 36);
+  EXPECT_GT(wrong.deviance, 51.0);  // 95 % quantile of chi squared with 36 degrees of freedom
+  EXPECT_LT(right.deviance, 51.0);
+}
+
+TEST(FieldFit, EveryFormFindsItsParameters) {
+  struct Case {
+    FieldFunction function;
+    std::vector<double> values;
+    std::vector<double> tolerance;
+  };
+  FieldFunction line, parabola, cues, power;
+  power.form = FieldForm::power;
+  line.form = FieldForm::threshold_line;
+  parabola.form = FieldForm::threshold_parabola;
+  parabola.shape = protocols::PsychometricShape::logistic;
+  cues.form = FieldForm::cues;
+  const Case cases[] = {{power, {0.8, 0.75, 0.02}, {0.4, 0.12}},
+                        {line, {0.08, 20, 0.5, 0.1, 0.02}, {0.03, 12, 0.15}},
+                        {parabola, {0.15, 30, 0.2, 0.004, 0.1, 0.02}, {0.06, 12, 0.5, 0.005}},
+                        {cues, {0.3, 25, 0.02}, {0.12, 5}}};
+  for (const Case& one : cases) {
+    SCOPED_TRACE(to_string(one.function.form));
+    Random random(17);
+    std::vector<PointCount> counts;
+    FieldModel model;
+    model.function = one.function;
+    const bool detects = !has_two_lapses(one.function.form);
+    model.guess.free = detects;
+    for (int i = 0; i < 1200; ++i) {
+      const double other = detects ? 25.0 * (i % 5) : 100.0 * (1 + i % 4);
+      const double conflict = 40.0 * (i % 3) - 40;
+      const double x =
+          detects ? std::round(140 * random.unit()) : std::round(other + 160 * random.unit() - 80);
+      const protocols::LevelPoint point{other, x, conflict};
+      const bool success = random.unit() < field_success(one.function, one.values, point);
+      counts.push_back({point, 1, success ? 1 : 0});
+    }
+    if (detects) {
+      model.catch_trials = 200;
+      for (int i = 0; i < 200; ++i) model.catch_successes += random.unit() < 0.1 ? 1 : 0;
+    }
+    const FieldFit fit = fit_field(sum_by_point(counts), model);
+    ASSERT_EQ(fit.undefined, "");
+    for (std::size_t k = 0; k < one.tolerance.size(); ++k) {
+      EXPECT_NEAR(fit.parameters[k].value, one.values[k], one.tolerance[k])
+          << fit.parameters[k].name;
+      EXPECT_LT(fit.parameters[k].ci95.low, fit.parameters[k].value);
+      EXPECT_GT(fit.parameters[k].ci95.high, fit.parameters[k].value);
+    }
+    EXPECT_EQ(fit.misfit.undefined, "");
+    EXPECT_GT(fit.misfit.p, 0.001);
+  }
+}
+
+TEST(FieldFit, AConstantJndLeavesWAndCOpen) {
+  FieldFunction flat;
+  flat.form = FieldForm::power;
+  const FieldFit fit = fit_field(answers_of(flat, {30, 0, 0.02}, 200, 3), {});
+  EXPECT_FALSE(parameter(fit, "w").closed);
+  EXPECT_EQ(parameter(fit, "w").ci95.low, 0);
+  EXPECT_TRUE(std::isinf(parameter(fit, "c").ci95.high));
+  EXPECT_TRUE(fit.jnd->closed);
+}
+
+TEST(FieldFit, SaysWhyThereIsNone) {
+  EXPECT_EQ(fit_field({}, {}).undefined, "no answers");
+  EXPECT_EQ(fit_field({{{100, 120}, 5, 5}, {{200, 300}, 5, 5}}, {}).undefined,
+            "all answers are alike");
+  EXPECT_EQ(fit_field({{{100, 120}, 5, 5}, {{100, 90}, 5, 1}}, {}).undefined,
+            "fewer than 2 values of the dimension over which it changes");
+  FieldModel power;
+  power.function.form = FieldForm::power;
+  EXPECT_EQ(fit_field({{{0, 120}, 5, 5}, {{100, 90}, 5, 1}}, power).undefined,
+            "a standard is not above 0");
+  const FieldFit two = fit_field(
+      {{{100, 80}, 9, 2}, {{100, 130}, 9, 7}, {{400, 300}, 9, 2}, {{400, 500}, 9, 8}}, {});
+  EXPECT_EQ(two.misfit.undefined, "no more places than the form has parameters for them");
+}
+
+}  // namespace
+}  // namespace palpate::analysis
