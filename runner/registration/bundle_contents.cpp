@@ -159,12 +159,23 @@ std::optional<double> level_of(const TrialFields& of, std::size_t row) {
   return of.number(row, "level");
 }
 
-/// \param factors  names, of the trial's protocol
+/// The columns of a block's dimensions; empty: it has none, or a catch trial.
+std::vector<double> point_of(const TrialFields& of, std::size_t row,
+                             const std::vector<std::string>& dimensions) {
+  std::vector<double> point;
+  for (const std::string& name : dimensions) {
+    if (of.has(name.c_str()) && !of.text(row, name.c_str()).empty())
+      point.push_back(of.number(row, name.c_str()));
+  }
+  return point;
+}
+
+/// \param protocol  of the trial
 study::ShownTrial shown_trial(const TrialFields& of, std::size_t row, int session,
-                              const std::vector<data::StoredFactor>& factors) {
+                              const data::StoredProtocol& protocol) {
   study::ShownTrial out;
   CellName stimulus{of.text(row, "shape")};
-  for (const data::StoredFactor& factor : factors) {
+  for (const data::StoredFactor& factor : protocol.factors) {
     const std::string& level = of.text(row, factor.name.c_str());
     if (!level.empty()) stimulus.levels.emplace_back(factor.name, level);
   }
@@ -177,25 +188,31 @@ study::ShownTrial shown_trial(const TrialFields& of, std::size_t row, int sessio
   out.outcome = {of.flag(row, "correct"), false, !of.flag(row, "timed_out"), std::nullopt};
   if (!of.has("task") || of.text(row, "block_name").empty()) return out;
   const std::string& comparison = of.text(row, "comparison_interval");
+  const auto block =
+      std::ranges::find(protocol.blocks, of.text(row, "block_name"), &data::StoredBlock::name);
+  const std::vector<std::string> dimensions =
+      block != protocol.blocks.end() ? block->dimensions : std::vector<std::string>();
   out.row.task = {static_cast<int>(of.count(row, "block")),
                   of.text(row, "block_name"),
                   static_cast<int>(of.count(row, "track")),
                   level_of(of, row),
                   of.flag(row, "catch_trial"),
                   comparison.empty() ? 0 : static_cast<int>(of.count(row, "comparison_interval")),
-                  of.has("reach_kind") ? of.text(row, "reach_kind") : ""};
+                  of.has("reach_kind") ? of.text(row, "reach_kind") : "",
+                  point_of(of, row, dimensions)};
   out.outcome.success = of.flag(row, "success");
   out.outcome.level = level_of(of, row);
+  out.outcome.point = out.row.task->point;
   return out;
 }
 
 /// The study as the check compares it, from the trials and record.json.
 StudyData study_of(const TextTable& table, const TrialFields& of, const StatedStudy& stated) {
   StudyData out;
-  std::map<std::string, std::vector<data::StoredFactor>> factors;  // by SHA-256 of the protocol
+  std::map<std::string, data::StoredProtocol> protocols;  // by SHA-256
   for (const analysis::ProtocolText& one : stated.record.protocols) {
     out.protocols.push_back({one.name, one.text, one.sha256});
-    factors[one.sha256] = data::read_stored_protocol(one.text).factors;
+    protocols[one.sha256] = data::read_stored_protocol(one.text);
   }
   std::map<std::pair<std::string, std::string>, std::size_t> known;
   std::set<std::pair<std::size_t, std::uint64_t>> sessions;
@@ -220,7 +237,7 @@ StudyData study_of(const TextTable& table, const TrialFields& of, const StatedSt
       run.info.session = session;
       run.info.observer_sha256 = of.text(i, "observer_sha256");
     }
-    one.shown.push_back(shown_trial(of, i, session, factors[sha256]));
+    one.shown.push_back(shown_trial(of, i, session, protocols[sha256]));
   }
   out.removed = stated.removed;
   return out;

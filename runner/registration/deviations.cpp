@@ -59,7 +59,8 @@ study::ShownTrial shown_trial(const data::TrialRecord& record) {
                   task.level,
                   task.catch_trial,
                   0,
-                  task.reach ? task.reach->kind : ""};
+                  task.reach ? task.reach->kind : "",
+                  out.outcome.point};
   for (std::size_t i = 0; task.task == "compare" && i < task.intervals.size(); ++i) {
     if (!task.intervals[i].standard) out.row.task->comparison = static_cast<int>(i) + 1;
   }

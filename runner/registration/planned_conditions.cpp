@@ -57,8 +57,31 @@ std::vector<std::string> measures_of_reaching(const Protocol& protocol, const Ta
   return out;
 }
 
+/// Whether the analysis finds a JND over several dimensions: by the form of QUEST+, or between a
+/// standard and a comparison of one number.
+bool has_jnd_of_points(const TaskBlock& block) {
+  using Of = protocols::LevelDimension::Of;
+  for (const protocols::ProcedureSpec& spec : block.procedures) {
+    if (const auto* quest = std::get_if<protocols::FieldQuestPlus>(&spec))
+      return quest->function.form == protocols::FieldForm::weber ||
+             quest->function.form == protocols::FieldForm::power;
+  }
+  const auto of = [&](Of what) {
+    return std::ranges::find(block.dimensions, what, &protocols::LevelDimension::of);
+  };
+  const auto standard = of(Of::standard), comparison = of(Of::comparison);
+  return block.dimensions.size() == 2 && standard != block.dimensions.end() &&
+         comparison != block.dimensions.end() &&
+         standard->target.pointer == comparison->target.pointer;
+}
+
 /// The measures that the analysis finds in a block, as plans name them.
 std::vector<std::string> measures_of(const Protocol& protocol, const TaskBlock& block) {
+  if (!block.dimensions.empty() && block.task != TaskKind::rate) {
+    const bool jnd = block.task == TaskKind::compare && has_jnd_of_points(block);
+    return jnd ? std::vector<std::string>{to_string(PlannedMeasure::jnd)}
+               : std::vector<std::string>();
+  }
   switch (block.task) {
     case TaskKind::identify:
       return {kTime, to_string(PlannedMeasure::accuracy)};

@@ -31,6 +31,7 @@ struct Kinds {
   bool same_different = false, detect = false, rate = false, numbers = false, adjust = false;
   bool reach = false;
   bool confidence = false, catch_trials = false;
+  bool field = false;  ///< levels of several dimensions
 
   bool functions() const { return compare || detect; }
 };
@@ -41,6 +42,10 @@ Kinds kinds_of(const protocols::Protocol& protocol) {
     if (block.practice) continue;
     out.confidence |= block.confidence.has_value();
     out.catch_trials |= block.catch_trials > 0;
+    if (!block.dimensions.empty() && block.task != TaskKind::rate) {
+      out.field = true;
+      continue;
+    }
     switch (block.task) {
       case TaskKind::identify:
         out.identify = true;
@@ -250,6 +255,15 @@ class TaskAnswers final : public StudyAnswers {
                  varied[protocols::level_name(block->level->pointer) + " of the stimulus" +
                         (unit_of(*block).empty() ? "" : " (" + unit_of(*block) + ")")]);
     }
+    for (const TaskBlock* block : blocks_) {
+      for (const protocols::LevelDimension& one : block->dimensions) {
+        const std::string unit = protocols::unit_of_level(one.target.pointer);
+        add_once(block->name,
+                 varied[one.name + ", " + protocols::level_name(one.target.pointer) + " of the " +
+                        (block->standard ? to_string(one.of) : "stimulus") +
+                        (unit == "1" ? "" : " (" + unit + ")")]);
+      }
+    }
     for (const auto& [level, names] : varied)
       out.push_back(item("level: " + level + ", in " + blocks_in_words(names) +
                          "; the levels are in question 6."));
@@ -310,6 +324,12 @@ class TaskAnswers final : public StudyAnswers {
                "standard."));
     if (kinds_.detect)
       out.push_back(item("Threshold of detection: the level half way between guess rate and 1."));
+    if (kinds_.field)
+      out.push_back(
+          item("Levels of several dimensions: the parameters of the form that the protocol names, "
+               "by maximum likelihood for each participant; of a form with a JND, that JND at the "
+               "median of the standards shown. What the profile likelihood leaves open at an end "
+               "is left out and counted."));
     if (kinds_.detect || kinds_.same_different)
       out.push_back(
           item("d' and criterion from the rates of hits and false alarms, where there "

@@ -232,7 +232,7 @@ class Groups(command_case.CommandCase):
         db = self.dir / "two.db"
         self.palpate("simulate", PROTOCOLS / "stiffness-two-groups.json", "--db", db, "--groups", "young=3,older=3")
         found = self.analyzed("--db", db)
-        self.assertEqual({one["measure"] for one in found["by_design"]}, {"pse", "jnd"})
+        self.assertEqual({one["measure"] for one in found["by_design"]}, {"jnd", "w", "c"})
 
 
 if __name__ == "__main__":
