@@ -7,7 +7,6 @@
 #include <variant>
 
 #include "analysis/statistics/describe.h"
-#include "protocols/tasks/levels.h"
 
 namespace palpate::analysis {
 namespace {
@@ -111,8 +110,8 @@ void sum_misfits(FieldAnalysis& field) {
 FieldAnalysis analyze_field(const std::vector<const StudyTrial*>& trials,
                             const protocols::BlockProcedures& block) {
   FieldAnalysis field;
-  for (const LevelDimension& one : block.dimensions)
-    field.dimensions.push_back({one.name, protocols::unit_of_level(one.target.pointer)});
+  for (std::size_t d = 0; d < block.dimensions.size(); ++d)
+    field.dimensions.push_back({block.dimensions[d].name, block.dimension_units[d]});
   const protocols::FieldQuestPlus* const quest = quest_of(block);
   const auto usual = usual_function(block);
   if (quest != nullptr) {

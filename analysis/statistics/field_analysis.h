@@ -7,9 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "analysis/input/study_trial.h"
+#include "analysis/input/study_table.h"
 #include "analysis/statistics/field_fit.h"
-#include "protocols/tasks/block_procedures.h"
 
 namespace palpate::analysis {
 

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "analysis/statistics/psychometric_fit.h"
-#include "protocols/procedures/field_function.h"
+#include "protocols/procedures/procedure_spec.h"
 
 namespace palpate::analysis {
 

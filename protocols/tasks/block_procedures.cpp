@@ -60,6 +60,8 @@ std::map<std::string, BlockProcedures> procedures_of_blocks(const std::string& t
     std::optional<LevelTarget> number;
     if (one.is_object() && one.contains(nlohmann::json::json_pointer("/level/dimensions")))
       read_level(block, number, procedures.dimensions);
+    for (const LevelDimension& dimension : procedures.dimensions)
+      procedures.dimension_units.push_back(unit_of_level(dimension.target.pointer));
     read_procedures(block, procedures.dimensions, procedures.specs);
     if (has_cells_apart(one))
       procedures.tracks_of_cell = count_of(one, "stimuli", 1) *

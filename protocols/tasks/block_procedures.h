@@ -20,7 +20,8 @@ struct BlockProcedures {
   bool asks_smaller = false;                 ///< compare: the interval with the smaller level
   std::string level_unit{};                  ///< "N/m", ...; "1" without one, "": nothing is varied
   std::vector<LevelDimension> dimensions{};  ///< of several; empty: the level is one number
-  std::vector<ScaleStep> rating_steps{};     ///< rate: of a labelled scale; empty: none
+  std::vector<std::string> dimension_units{};  ///< "N/m", ...; "1": without
+  std::vector<ScaleStep> rating_steps{};       ///< rate: of a labelled scale; empty: none
 
   /// The spec of a track, from 1.
   /// \pre specs is not empty

@@ -403,7 +403,7 @@ bool Session::ask_level() {
   };
   const std::optional<Proposal> proposal = station_.advisor->ask(trial);
   if (proposal && proposal->finished) {
-    note({{"block_ended_by_program",
+    note({{kBlockEnded,
            {{"session", trial.session}, {"block", block.name}, {"before_trial", trial.trial}}}});
     asked_trial_ = 0;  // the next trial has the same number
     station_.plan.end_block();

@@ -61,6 +61,7 @@ struct Work {
   data::Participant participant;
   int session = 1;
   std::vector<protocols::TrialOutcome> answers;  ///< of the trials on record
+  std::vector<std::string> notes;                ///< of earlier runs, in order
   std::int64_t clock_ns = 0;                     ///< the session's clock at its last record
   data::RunInfo info;
   std::vector<data::PageAnswer> page_answers;
@@ -160,6 +161,7 @@ class QueueLog final : public TrialLog {
 protocols::SessionPlan plan_of(const protocols::Protocol& protocol, const Work& work) {
   protocols::SessionPlan plan(protocol, work.participant.enrolled_number, work.session);
   for (const protocols::TrialOutcome& outcome : work.answers) plan.answered(outcome);
+  for (const std::string& note : work.notes) end_as_noted(plan, note);
   return plan;
 }
 
@@ -214,6 +216,9 @@ std::vector<Work> unfinished_work(const protocols::Protocol& protocol, data::Sto
       }
       for (const data::TrialRecord& record : before.completed)
         work.answers.push_back(outcome_of(record));
+      for (const data::StoredNote& note : store.notes())
+        if (note.participant.id == participant.id && note.session == session)
+          work.notes.push_back(note.text);
       const bool learns = std::ranges::any_of(shown.blocks, [](const protocols::TaskBlock& block) {
         return block.reaching.has_value();
       });
@@ -272,8 +277,20 @@ class Recorder {
   void record(const std::deque<std::pair<std::size_t, std::vector<data::PageAnswer>>>& pages) {
     for (const auto& [index, answers] : pages) store_.add_page_answers(run_of(index), answers);
   }
-  void record(const std::deque<Queue::Note>& notes) {
-    for (const Queue::Note& note : notes) store_.add_note(run_of(note.work), note.at_ns, note.text);
+  void record(const std::deque<Queue::Note>& notes, StudyProgress& progress) {
+    for (const Queue::Note& note : notes) {
+      store_.add_note(run_of(note.work), note.at_ns, note.text);
+      if (note.text.find(kBlockEnded) != std::string::npos) ends_.push_back(note);
+    }
+    // A note may come before the last trial of its block does.
+    std::erase_if(ends_, [&](const Queue::Note& note) {
+      protocols::SessionPlan& plan = plans_[note.work];
+      const std::size_t size = plan.size();
+      if (!end_as_noted(plan, note.text)) return false;
+      progress.expected += static_cast<std::int64_t>(plan.size()) - static_cast<std::int64_t>(size);
+      if (plan.finished()) finished_.push_back(note.work);
+      return true;
+    });
   }
   void end_finished() {
     for (const std::size_t index : std::exchange(finished_, {})) {
@@ -301,6 +318,7 @@ class Recorder {
   data::Store& store_;
   std::vector<Work>& work_;
   std::vector<std::size_t> finished_;
+  std::deque<Queue::Note> ends_;  ///< of blocks, by a program, whose last trial is not recorded
   const std::string event_;
   std::vector<protocols::SessionPlan> plans_;
   std::map<std::size_t, data::Run> runs_;
@@ -510,7 +528,7 @@ StudyProgress simulate_study(const protocols::Protocol& protocol, data::Store& s
     try {
       recorder.record(std::move(came), progress);
       recorder.record(queue.take_pages());
-      recorder.record(queue.take_notes());
+      recorder.record(queue.take_notes(), progress);
       if (all_done) recorder.end_finished();
       if (report) report(progress);
     } catch (...) {

@@ -69,7 +69,11 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   palpate::runner::session::SocketAdvisor advisor(
       protocol, {.path = file.path(), .time_out = 0.002, .participant = 1, .session = 1}, {});
   listener.answer(data, size);
-  const std::optional<double> level = advisor.ask(next);
-  if (level ? !(*level >= 300 && *level <= 600) : advisor.trouble().empty()) std::abort();
+  const auto proposal = advisor.ask(next);
+  if (!proposal) {
+    if (advisor.trouble().empty()) std::abort();
+  } else if (!proposal->finished && !(*proposal->level >= 300 && *proposal->level <= 600)) {
+    std::abort();
+  }
   return 0;
 }

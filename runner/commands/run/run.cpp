@@ -371,6 +371,9 @@ int run_command(const std::vector<std::string>& args) {
   protocols::SessionPlan plan(protocol, participant.enrolled_number, session);
   for (const data::TrialRecord& trial : progress.completed)
     plan.answered(session::outcome_of(trial));
+  for (const data::StoredNote& note : store.notes())
+    if (note.participant.id == participant.id && note.session == session)
+      session::end_as_noted(plan, note.text);
   const std::string resumed = station::resumption(store, participant, session, plan);
 
   std::optional<session::SocketAdvisor> advisor;

@@ -258,8 +258,8 @@ function plain_control(context, path, schema, branch) {
   if (key === 'set' && path[0] === 'factors' && type === 'object') return set_control(context, path);
   if (key === 'patch' && path[0] === 'groups' && path.length === 2 && type === 'object') return patch_control(context, path);
   if (type === 'string' && kind) return select_control(context, path, names_of(context.values, kind), key, one => context.replace(path, JSON.stringify(one)));
-  if (type === 'string' && key === 'path' && path.at(-2) === 'level') {
-    const {levels} = context.form.naming(path.slice(0, -2));
+  if (type === 'string' && key === 'path' && (path.at(-2) === 'level' || path.at(-3) === 'dimensions')) {
+    const {levels} = context.form.naming(path);
     return select_control(context, path, [...levels, '/orientation'], key, one => context.rebuild(set_member(context.text, path.slice(0, -1), 'path', JSON.stringify(one)), path));
   }
   if (branch.json.enum && type !== 'object' && type !== 'array') return choice_control(context, path, branch);

@@ -86,7 +86,12 @@ export class Form {
   unit_key(path, key) {
     if (key.startsWith('/')) return key.split('/').findLast(step => !/^\d+$/.test(step));
     const block = path[0] === 'blocks' ? this.values.blocks?.[path[1]] : undefined;
-    const varied = block?.level?.path?.split('/').findLast(step => !/^\d+$/.test(step));
+    const last = pointer => pointer?.split('/').findLast(step => !/^\d+$/.test(step));
+    // Values of a dimension, by its name.
+    const at = path.findIndex(step => step === 'grid' || step === 'ranges');
+    const dimension = at < 0 ? undefined : block?.level?.dimensions?.find(one => one?.name === (path[at + 1] ?? key));
+    if (dimension && key !== 'count') return last(dimension.path) ?? key;
+    const varied = last(block?.level?.path);
     const of_level = ['levels', 'threshold', 'start', 'starts', 'min', 'max', 'steps', 'step', 'turn', 'low', 'high'];
     // Parts of a range or of weighted values have the unit of the whole.
     const whole = ['from', 'to', 'values'].includes(key) ? path.at(-1) : key;

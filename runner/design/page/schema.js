@@ -79,6 +79,7 @@ class Schema {
     const constant = Object.entries(this.json.properties ?? {}).filter(([, inner]) => inner && 'const' in inner);
     if ('const' in this.json) return this.json.const === value;
     if (this.json.enum) return this.json.enum.includes(value);
+    if (Array.isArray(value) && value.length && this.json.items) return this.of(this.json.items).matches(value[0]);
     return constant.every(([key, inner]) => value?.[key] === inner.const);
   }
 

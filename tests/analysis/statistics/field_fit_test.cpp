@@ -141,8 +141,8 @@ TEST(FieldFit, EveryFormFindsItsParameters) {
     for (int i = 0; i < 1200; ++i) {
       const double other = detects ? 25.0 * (i % 5) : 100.0 * (1 + i % 4);
       const double conflict = 40.0 * (i % 3) - 40;
-      const double x =
-          detects ? std::round(140 * random.unit()) : std::round(other + 160 * random.unit() - 80);
+      const double x = detects ? 10 * std::round(14 * random.unit())
+                               : other + 10 * std::round(16 * random.unit() - 8);
       const protocols::LevelPoint point{other, x, conflict};
       const bool success = random.unit() < field_success(one.function, one.values, point);
       counts.push_back({point, 1, success ? 1 : 0});

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <set>
 
+#include "data/base/sobol.h"
 #include "runner/sweep/swept_study.h"
 
 namespace palpate::runner::sweep {
