@@ -35,7 +35,7 @@ namespace {
 
 // Columns of numbers in the text of a page: integer multiples of a step, as differences of the
 // order that takes the fewest bytes, 7 bits a byte (zigzag, least significant first), in one zlib
-// stream (RFC 1950) in base64. watch.js reads them.
+// stream (RFC 1950) in base64. trial.js reads them.
 
 class WholeNumbers {
  public:

@@ -45,7 +45,7 @@ TrialPage trial_page(const std::vector<WatchedTrial>& trials, bool compare);
 // Texts that the build embeds.
 
 std::string_view watch_css();  ///< watch.css
-std::string_view watch_js();   ///< drawing.js and watch.js
+std::string_view watch_js();   ///< drawing.js to watch.js
 std::string_view live_page();  ///< the watchers' page of palpate serve: live.html with its script
 
 }  // namespace palpate::runner::touch

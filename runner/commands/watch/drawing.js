@@ -196,5 +196,17 @@ const palpate_drawing = (() => {
     };
   }
 
-  return {add, sub, times, dot, cross, size, unit, frame, turned, placed, joined, surface_of, axes_of, painter, kLight, kDark};
+  // ---- SVG -----------------------------------------------------------------------------------
+
+  const kSvg = 'http://www.w3.org/2000/svg';
+  function node(kind, attributes, parent, text) {
+    const out = document.createElementNS(kSvg, kind);
+    for (const [name, value] of Object.entries(attributes)) out.setAttribute(name, value);
+    if (text !== undefined) out.textContent = text;
+    if (parent) parent.append(out);
+    return out;
+  }
+  const px = v => v.toFixed(1);
+
+  return {add, sub, times, dot, cross, size, unit, frame, turned, placed, joined, surface_of, axes_of, painter, node, px, kLight, kDark};
 })();

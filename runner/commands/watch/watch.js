@@ -1,105 +1,13 @@
-// A trial on a page: decodes its ticks and draws them at the time that the reader chooses.
+// A trial on a page: draws its ticks at the time that the reader chooses.
 (async () => {
   'use strict';
   const $ = id => document.getElementById(id);
   const given = JSON.parse($('ticks').textContent);
   const kSpeeds = [0.05, 0.1, 0.2, 0.5, 1, 2, 4];
-  const {add, sub, times, dot, cross, size, unit, frame, turned, placed, joined, surface_of, painter, kLight,
-         kDark} = palpate_drawing;
+  const {sub, times, size, frame, placed, node, painter, kLight, kDark} = palpate_drawing;
+  const {scaled, v3} = palpate_trial;
 
-  // ---- numbers -------------------------------------------------------------------------------
-
-  // Decodes a zlib stream in base64: integers, 7 bits a byte, zigzag, each column as differences.
-  async function unpacked(text) {
-    const bytes = Uint8Array.from(atob(text), c => c.charCodeAt(0));
-    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream('deflate'));
-    return new Uint8Array(await new Response(stream).arrayBuffer());
-  }
-  async function columns(data, specs) {
-    const bytes = await unpacked(data);
-    let at = 0;
-    const out = {};
-    for (const [name, count, step, order] of specs) {
-      const column = new Float64Array(count);
-      const sums = [0, 0, 0, 0];
-      for (let i = 0; i < count; ++i) {
-        let value = 0, scale = 1, byte;
-        do {
-          byte = bytes[at++];
-          value += (byte & 127) * scale;
-          scale *= 128;
-        } while (byte > 127);
-        sums[order] = value % 2 ? -(value + 1) / 2 : value / 2;
-        for (let k = order; k > 0; --k) sums[k - 1] += sums[k];
-        column[i] = sums[0] / step;
-      }
-      out[name] = column;
-    }
-    return out;
-  }
-
-  // ---- meshes --------------------------------------------------------------------------------
-
-  async function mesh_of(given) {
-    const c = await columns(given.data, given.columns);
-    const triangles = [];
-    for (let i = 0; i < c.corner.length; i += 3) triangles.push([c.corner[i], c.corner[i + 1], c.corner[i + 2]]);
-    return surface_of(Array.from(c.x, (x, i) => [x, c.y[i], c.z[i]]), triangles);
-  }
-
-  // ---- the trial -----------------------------------------------------------------------------
-
-  const meshes = await Promise.all(given.meshes.map(mesh_of));
-  const shows = [];
-  for (const one of given.shows) {
-    const show = {...one, c: await columns(one.data, one.columns)};
-    delete show.data;
-    if (one.path !== undefined) show.c = {...shows[one.path].c, ...show.c};
-    const c = show.c, n = c.t.length;
-    // The intervals of a trial are consecutive on one axis of time.
-    show.time = new Float64Array(n);
-    let first = 0, start = 0;
-    for (const part of show.parts) {
-      part.first = first;
-      part.start = start;
-      for (let i = 0; i < part.ticks; ++i) show.time[first + i] = start + c.t[first + i];
-      first += part.ticks;
-      start = part.ticks ? show.time[first - 1] + given.period : start;
-      part.end = first;
-    }
-    show.magnitude = c.force_x.map((x, i) => Math.hypot(x, c.force_y[i], c.force_z[i]));
-    shows.push(show);
-  }
-  const v3 = (c, name, i) => [c[name + '_x'][i], c[name + '_y'][i], c[name + '_z'][i]];
-  function tick(show, i) {
-    const c = show.c, part = show.parts.find(p => i < p.end);
-    const tip = v3(c, 'tip', i), tail = v3(c, 'tail', i);
-    const ideal_tip = add(tip, v3(c, 'lag_tip', i)), ideal_tail = add(add(tail, v3(c, 'lag_tip', i)), v3(c, 'lag_turn', i));
-    let object = null;
-    if (part.mesh !== null) {
-      object = frame(part.pose);
-      if (c.moved_x) object = joined(frame([...v3(c, 'moved', i), c.moved_qw[i], c.moved_qx[i], c.moved_qy[i], c.moved_qz[i]]), object);
-    }
-    const lines = (a, b) => {
-      if (!show.tool) return [[a, b]];
-      const z = unit(sub(b, a)), s = v3(c, 'side', i), x = unit(sub(s, times(dot(s, z), z)));
-      const f = {x, y: cross(z, x), z, o: a};
-      return show.tool.map(([from, to]) => [placed(f, from), placed(f, to)]);
-    };
-    const felt = part.mesh === null ? null : {mesh: meshes[part.mesh], object};
-    const seen = part.seen ? {mesh: meshes[part.seen.mesh], object: scaled(frame(part.seen.pose), part.seen.scale)} : null;
-    return {
-      t: c.t[i], part, felt, seen, objects: [...(felt ? [felt] : []), ...(seen ? [{...seen, colour: 'virtual', opacity: 0.3}] : [])],
-      virtual: lines(tip, tail), ideal: lines(ideal_tip, ideal_tail),
-      force: v3(c, 'force', i), depth: c.depth[i], contacts: c.contacts[i],
-      contact: c.contacts[i] > 0 ? add(ideal_tip, v3(c, 'contact', i)) : null,
-      type: given.types[c.type[i]], faults: given.faults.filter(([bit]) => (c.faults[i] & bit) !== 0),
-    };
-  }
-
-  function scaled(f, by) {
-    return {x: times(by, f.x), y: times(by, f.y), z: times(by, f.z), o: f.o};
-  }
+  const {meshes, shows, tick} = await palpate_trial.trial_of(given);
 
   // The size of all objects, so that pictures side by side have one scale.
   const outline = [];
@@ -130,176 +38,6 @@
   const dark = matchMedia('(prefers-color-scheme: dark)');
   const stage = {camera, radius, centre, metres_a_newton, colours: () => dark.matches && !printing ? kDark : kLight};
 
-  const kSvg = 'http://www.w3.org/2000/svg';
-  function node(kind, attributes, parent, text) {
-    const out = document.createElementNS(kSvg, kind);
-    for (const [name, value] of Object.entries(attributes)) out.setAttribute(name, value);
-    if (text !== undefined) out.textContent = text;
-    if (parent) parent.append(out);
-    return out;
-  }
-  const px = v => v.toFixed(1);
-
-  // Above: from above; below: from the front and from the right.
-  const kViews = [
-    {name: 'from above', x: 0, y: 0, right: [1, 0, 0], up: [0, 1, 0]},
-    {name: 'from the front', x: 0, y: 150, right: [1, 0, 0], up: [0, 0, 1]},
-    {name: 'from the right', x: 200, y: 150, right: [0, 1, 0], up: [0, 0, 1]},
-  ];
-  function three_views(svg, number) {
-    svg.setAttribute('viewBox', '0 0 400 300');
-    const panels = kViews.map((view, i) => {
-      const clip = `clip-${number}-${i}`;
-      const defs = node('clipPath', {id: clip}, svg);
-      node('rect', {x: view.x, y: view.y, width: 200, height: 150}, defs);
-      const g = node('g', {'clip-path': `url(#${clip})`}, svg);
-      const out = {view};
-      for (const kind of ['object', 'crease', 'seen', 'virtual', 'ideal', 'force'])
-        out[kind] = node('path', {class: kind}, g);
-      out.contact = node('circle', {class: 'contact', r: 4}, g);
-      node('rect', {class: 'frame', x: view.x, y: view.y, width: 200, height: 150}, svg);
-      node('text', {x: view.x + 7, y: view.y + 17}, svg, view.name);
-      return out;
-    });
-    const bar = node('path', {class: 'crease'}, svg), words = node('text', {x: 216, y: 112}, svg);
-    const arrow = node('path', {class: 'force'}, svg), newtons = node('text', {x: 216, y: 62}, svg);
-    let drawn = null;
-    return moment => {
-      const scale = 45 * camera.zoom / radius;
-      const still = drawn === scale + ' ' + moment.part.first && !shows[number].c.moved_x;
-      drawn = scale + ' ' + moment.part.first;
-      for (const panel of panels) {
-        const {view} = panel, into = cross(view.up, view.right);
-        const at = p => {
-          const d = sub(p, centre);
-          return px(view.x + 100 + scale * dot(d, view.right)) + ' ' + px(view.y + 75 - scale * dot(d, view.up));
-        };
-        if (!still) {
-          const outlined = ({mesh, object}) => {
-            let fill = '', lines = '';
-            const where = mesh.corners.map(corner => at(placed(object, corner)));
-            const front = mesh.units.map(n => dot(turned(object, n), into) < 1e-9);
-            mesh.triangles.forEach((t, i) => {
-              if (front[i]) fill += 'M' + t.map(v => where[v]).join('L') + 'Z';
-            });
-            for (const [a, b, one, two, crease] of mesh.edges)
-              if (front[one] !== front[two] || (crease && front[one])) lines += 'M' + where[a] + 'L' + where[b];
-            return {fill, lines};
-          };
-          const felt = moment.felt ? outlined(moment.felt) : {fill: '', lines: ''};
-          panel.object.setAttribute('d', felt.fill);
-          panel.crease.setAttribute('d', felt.lines);
-          panel.seen.setAttribute('d', moment.seen ? outlined(moment.seen).lines : '');
-        }
-        const path = lines => lines.map(([a, b]) => 'M' + at(a) + 'L' + at(b)).join('');
-        panel.virtual.setAttribute('d', path(moment.virtual));
-        panel.ideal.setAttribute('d', path(moment.ideal));
-        panel.contact.toggleAttribute('hidden', !moment.contact);
-        panel.contact.style.display = moment.contact ? '' : 'none';
-        let shaft = '';
-        if (moment.contact) {
-          const [x, y] = at(moment.contact).split(' ').map(Number);
-          panel.contact.setAttribute('cx', x);
-          panel.contact.setAttribute('cy', y);
-          const dx = scale * metres_a_newton * dot(moment.force, view.right);
-          const dy = -scale * metres_a_newton * dot(moment.force, view.up), length = Math.hypot(dx, dy);
-          if (length > 2) {
-            const [ux, uy, head] = [dx / length, dy / length, Math.min(8, 0.5 * length)];
-            const barb = s => `L${px(x + dx - head * ux + s * 0.5 * head * uy)} ${px(y + dy - head * uy - s * 0.5 * head * ux)}`;
-            const tip = `${px(x + dx)} ${px(y + dy)}`;
-            shaft = `M${x} ${y}L${tip}M${tip}${barb(1)}M${tip}${barb(-1)}`;
-          }
-        }
-        panel.force.setAttribute('d', shaft);
-      }
-      const step = most => {
-        const power = 10 ** Math.floor(Math.log10(most));
-        return [5, 2, 1].map(k => k * power).find(k => k <= most);
-      };
-      const length = step(150 / scale);
-      bar.setAttribute('d', `M216 88V96M216 92H${px(216 + scale * length)}M${px(216 + scale * length)} 88V96`);
-      words.textContent = `${+(1000 * length).toPrecision(3)} mm`;
-      if (!metres_a_newton) return;
-      const force = step(150 / (scale * metres_a_newton)), end = 216 + scale * metres_a_newton * force;
-      arrow.setAttribute('d', `M216 42H${px(end)}m-8 -4l8 4l-8 4`);
-      newtons.textContent = `${+force.toPrecision(3)} N`;
-    };
-  }
-
-  // ---- force against time --------------------------------------------------------------------
-
-  function plot(svg, show) {
-    const kLeft = 44, kTop = 18, kBottom = 24;
-    let width = 0, height = 0, cursor = null;
-    const x = t => kLeft + (width - kLeft - 8) * (last > 0 ? t / last : 0);
-    const most = strongest > 0 ? strongest : 1;
-    const y = f => height - kBottom - (height - kTop - kBottom) * f / most;
-    function redraw() {
-      width = Math.max(svg.clientWidth, 160);
-      height = Math.max(svg.clientHeight, 90);
-      svg.setAttribute('viewBox', `0 0 ${width} ${height}`);
-      svg.replaceChildren();
-      const c = show.c, n = show.time.length;
-      // Contact, as bands.
-      let bands = '';
-      for (let i = 0; i < n; ++i) {
-        if (!(c.contacts[i] > 0)) continue;
-        let k = i;
-        while (k + 1 < n && c.contacts[k + 1] > 0) ++k;
-        bands += `M${px(x(show.time[i]))} ${kTop}V${height - kBottom}H${px(Math.max(x(show.time[k]), x(show.time[i]) + 0.7))}V${kTop}Z`;
-        i = k;
-      }
-      node('path', {class: 'touch', d: bands}, svg);
-      node('path', {class: 'axis', d: `M${kLeft} ${kTop}V${height - kBottom}H${width - 8}`, fill: 'none'}, svg);
-      // Draw the least and the greatest force of every pixel, so that no peak is lost.
-      let curve = '';
-      for (let i = 0; i < n;) {
-        const column = Math.floor(x(show.time[i]));
-        let least = i, greatest = i;
-        for (; i < n && Math.floor(x(show.time[i])) === column; ++i) {
-          if (show.magnitude[i] < show.magnitude[least]) least = i;
-          if (show.magnitude[i] > show.magnitude[greatest]) greatest = i;
-        }
-        for (const k of [...new Set([least, greatest])].sort((a, b) => a - b))
-          curve += (curve ? 'L' : 'M') + px(x(show.time[k])) + ' ' + px(y(show.magnitude[k]));
-      }
-      node('path', {class: 'curve', d: curve}, svg);
-      for (const part of show.parts.slice(1))
-        node('path', {class: 'axis', d: `M${px(x(part.start))} ${kTop}V${height - kBottom}`}, svg);
-      node('text', {x: 2, y: 12}, svg, 'force, N');
-      node('text', {x: kLeft - 6, y: kTop + 10, 'text-anchor': 'end'}, svg, most.toFixed(most < 1 ? 2 : 1));
-      node('text', {x: kLeft - 6, y: height - kBottom, 'text-anchor': 'end'}, svg, '0');
-      const power = 10 ** Math.floor(Math.log10(Math.max(last, 1e-3))), count = last / power;
-      const step = power * (count >= 5 ? 1 : count >= 2 ? 0.5 : 0.2);
-      for (let t = 0; t <= last + 1e-9; t += step) {
-        const end = x(t) > width - 30;
-        node('path', {class: 'axis', d: `M${px(x(t))} ${height - kBottom}v4`}, svg);
-        node('text', {x: px(end ? width - 2 : x(t)), y: height - 7, 'text-anchor': end ? 'end' : 'middle'}, svg,
-             String(+t.toFixed(3)) + (t === 0 ? ' s' : ''));
-      }
-      cursor = node('path', {class: 'now'}, svg);
-      mark();
-    }
-    function mark() {
-      if (cursor) cursor.setAttribute('d', `M${px(x(now))} ${kTop - 4}V${height - kBottom}`);
-    }
-    const seek_there = event => {
-      const box = svg.getBoundingClientRect();
-      stop();
-      seek(last * (event.clientX - box.left - kLeft * box.width / width) / ((width - kLeft - 8) * box.width / width));
-    };
-    svg.addEventListener('pointerdown', event => {
-      svg.setPointerCapture(event.pointerId);
-      seek_there(event);
-    });
-    svg.addEventListener('pointermove', event => {
-      if (event.buttons) seek_there(event);
-    });
-    new ResizeObserver(redraw).observe(svg);
-    redraw();
-    return mark;
-  }
-
   // ---- the page ------------------------------------------------------------------------------
 
   const element = (kind, parent, text, name) => {
@@ -324,7 +62,7 @@
     show.paint = painter(canvas, stage);
     if (!show.paint) any_solid = false;
     const svg = node('svg', {role: 'img', 'aria-label': `${show.title}: object, tool and force from three sides`}, picture);
-    show.project = three_views(svg, number);
+    show.project = palpate_three_views(svg, stage, number, Boolean(show.c.moved_x));
     show.canvas = canvas;
     show.svg = svg;
     turn_by(canvas);
@@ -336,7 +74,10 @@
       show.cells[name] = element('dd', list);
       if (name === 'shown' && show.parts.length < 2) term.hidden = show.cells[name].hidden = true;
     }
-    show.mark = plot(graph, show);
+    show.mark = palpate_force_plot(graph, show, {last, strongest, now: () => now, seek: t => {
+      stop();
+      seek(t);
+    }});
   });
   if (!any_solid) solid = false;
 
