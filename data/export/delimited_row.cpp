@@ -423,8 +423,8 @@ struct ColumnSets {
   bool cut_off = false;  ///< of attempts that were cut off
   bool tasks = false, reaches = false, seen = false, heard = false, torque = false,
        relative = false, groups = false;
-  std::vector<std::pair<std::string, std::string>> levels;  ///< of factors
-  std::vector<std::string> dimensions;
+  std::vector<std::pair<std::string, std::string>> levels = {};  ///< of factors
+  std::vector<std::string> dimensions = {};
   auto operator<=>(const ColumnSets&) const = default;
 };
 

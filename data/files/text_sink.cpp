@@ -14,7 +14,7 @@
 namespace palpate::data {
 namespace {
 
-constexpr std::size_t kMember = 4 << 20;  // bytes of text
+constexpr std::size_t kMember = 512 << 10;  // bytes of text
 
 std::string gzip_member(std::string_view text) {
   constexpr int kLevel = 6;  // files are as large as with zlib's 6; 9 saves another 2 %
@@ -24,6 +24,7 @@ std::string gzip_member(std::string_view text) {
   std::string packed(libdeflate_gzip_compress_bound(compressor.get(), text.size()), '\0');
   packed.resize(libdeflate_gzip_compress(compressor.get(), text.data(), text.size(), packed.data(),
                                          packed.size()));
+  packed.shrink_to_fit();
   return packed;
 }
 
