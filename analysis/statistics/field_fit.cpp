@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <boost/math/distributions/chi_squared.hpp>
+#include <boost/math/tools/minima.hpp>
+#include <boost/math/tools/roots.hpp>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <limits>
 #include <map>
@@ -230,21 +233,30 @@ std::vector<std::size_t> all_but(std::size_t count, std::size_t held) {
   return out;
 }
 
+/// Where the loss crosses that of a 95 % interval. \param loss_inside, loss_outside  below and
+/// above it
+double crossing(const std::function<double(double)>& loss_at, double inside, double outside,
+                double loss_inside, double loss_outside) {
+  constexpr double kNear = 1e-5;
+  std::uintmax_t most = 40;
+  const bool up = inside < outside;
+  const auto [low, high] = boost::math::tools::toms748_solve(
+      [&](double u) { return loss_at(u) - kHalfChiSquared95; }, up ? inside : outside,
+      up ? outside : inside, (up ? loss_inside : loss_outside) - kHalfChiSquared95,
+      (up ? loss_outside : loss_inside) - kHalfChiSquared95,
+      [](double a, double b) { return std::abs(a - b) < kNear; }, most);
+  return 0.5 * (low + high);
+}
+
 /// The end of a profile interval on one side. \param loss_at  at a coordinate: loss of profile log
 /// likelihood \return the coordinate; infinite: nothing is excluded
 double profile_end(const std::function<double(double)>& loss_at, double best, double direction) {
-  double inside = best, step = 0.1;
+  double inside = best, step = 0.1, loss_inside = 0;
   for (int i = 0; i < 12; ++i, step *= 2) {
-    double outside = inside + direction * step;
-    if (loss_at(outside) <= kHalfChiSquared95) {
-      inside = outside;
-      continue;
-    }
-    for (int k = 0; k < 18; ++k) {
-      const double between = 0.5 * (inside + outside);
-      (loss_at(between) > kHalfChiSquared95 ? outside : inside) = between;
-    }
-    return 0.5 * (inside + outside);
+    const double outside = inside + direction * step, loss = loss_at(outside);
+    if (loss > kHalfChiSquared95) return crossing(loss_at, inside, outside, loss_inside, loss);
+    inside = outside;
+    loss_inside = loss;
   }
   return direction * kInfinity;
 }
@@ -296,13 +308,8 @@ FieldParameter profiled_rate(const FieldLikelihood& likelihood, const std::vecto
                       own);
   };
   const auto end = [&](double limit) {
-    if (loss_at(limit) <= kHalfChiSquared95) return limit;
-    double inside = out.value, outside = limit;
-    for (int k = 0; k < 14; ++k) {
-      const double between = 0.5 * (inside + outside);
-      (loss_at(between) > kHalfChiSquared95 ? outside : inside) = between;
-    }
-    return 0.5 * (inside + outside);
+    const double loss = loss_at(limit);
+    return loss > kHalfChiSquared95 ? crossing(loss_at, out.value, limit, 0, loss) : limit;
   };
   out.ci95 = {end(0), end(largest)};
   out.closed = out.ci95.low > 0 && out.ci95.high < largest;
@@ -425,7 +432,10 @@ FieldMisfit misfit_of(const FieldLikelihood& likelihood, const std::vector<doubl
   out.df = static_cast<int>(places.size() - locations);
   const bool ratios = function.form == FieldForm::weber || function.form == FieldForm::power;
   const double unit = ratios ? 1 : likelihood.scales().x_range;
-  // The locations one by one, within a search of what they share.
+  // The locations one by one, within a search of what they share. Ratios of locations are searched
+  // from 1/20 to 20, others three ranges of x to each side.
+  constexpr double kFar = 3;
+  constexpr int kBits = 24;
   const auto value_at = [&](const std::vector<double>& shared, std::vector<double>* found) {
     double sum = likelihood.of_catch_trials(shared);
     std::size_t k = 0;
@@ -434,19 +444,19 @@ FieldMisfit misfit_of(const FieldLikelihood& likelihood, const std::vector<doubl
       const auto of = [&](double u) {
         return ratios ? start * std::exp(std::clamp(u, -20.0, 20.0)) : start + unit * u;
       };
-      const auto loss = [&](const std::vector<double>& u) {
+      const auto loss = [&](double u) {
         double own = 0;
         for (const PointCount* count : counts)
           own -= log_binomial_part(
               count->trials, count->successes,
               likelihood.with_rates(
-                  share_at_location(function, count->point, of(u[0]), width ? shared[*width] : 1),
+                  share_at_location(function, count->point, of(u), width ? shared[*width] : 1),
                   shared));
         return own;
       };
-      const SimplexMinimum minimum = minimize(loss, {0}, {0.2}, 1e-9);
-      sum -= minimum.value;
-      if (found != nullptr) found->push_back(of(minimum.place[0]));
+      const auto [u, least] = boost::math::tools::brent_find_minima(loss, -kFar, kFar, kBits);
+      sum -= least;
+      if (found != nullptr) found->push_back(of(u));
     }
     return sum;
   };
