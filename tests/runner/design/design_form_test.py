@@ -19,6 +19,8 @@ from design_case import PALPATE, PATIENCE  # noqa: E402
 from design_http_test import PROTOCOL_FILES, cube_stl  # noqa: E402
 
 TESTS = pathlib.Path(__file__).resolve().parents[2]
+# And one with levels of several dimensions in every task and procedure.
+FORM_FILES = [*PROTOCOL_FILES, TESTS / "protocols" / "good" / "dimensions-v2.json"]
 PARTS = ["study", "stimuli", "blocks", "groups", "answers", "pages", "texts", "space"]
 # What people read beside a number of such a key: what the README's table says, lengths in mm.
 UNITS = {
@@ -99,7 +101,7 @@ class FormCase(BrowserCase):
 
 class Round(FormCase):
     def test_every_leaf_has_a_control(self):
-        for path in PROTOCOL_FILES:
+        for path in FORM_FILES:
             with self.subTest(path.name):
                 process = self.page(shutil.copy(path, self.dir), checked=False)
                 self.wait_for("window.design !== undefined")
@@ -114,7 +116,7 @@ class Round(FormCase):
 
     def test_untouched_controls_change_nothing(self):
         touched = 0
-        for path in PROTOCOL_FILES:
+        for path in FORM_FILES:
             with self.subTest(path.name):
                 process = self.page(shutil.copy(path, self.dir), checked=False)
                 self.wait_for("window.design !== undefined")
@@ -212,8 +214,37 @@ class Round(FormCase):
             self.assertIn("mm", units, member)
             self.assertNotIn("m", units, member)
 
+    def test_values_of_a_dimension_have_its_unit(self):
+        self.page(self.copy("stiffness-two-groups.json"))
+        self.show("blocks", 1)
+        self.assertEqual(self.js("""[...document.querySelectorAll('main [data-row*="/grid/"] .unit')].map(e => e.textContent).filter(t => t !== '')
+            .filter((t, i, all) => all.indexOf(t) === i)"""), ["N/m"])
+        self.assertGreater(self.js("""document.querySelectorAll('main [data-row*="/grid/"] .unit').length"""), 3)
+
 
 class Edits(FormCase):
+    def test_a_dimension_is_chosen_and_its_values_change(self):
+        self.page(self.copy("stiffness-two-groups.json"))
+        self.show("blocks", 1)
+        before = self.text()
+        self.enter("/blocks/1/procedure/grid/reference/0", "175")
+        self.assertEqual(self.changed_lines(before), [
+            '-         "grid": {"reference": [150, 300, 450], "stiffness": {"from": 75, "to": 600, "count": 37, "spacing": "log"}},',
+            '+         "grid": {"reference": [175, 300, 450], "stiffness": {"from": 75, "to": 600, "count": 37, "spacing": "log"}},'])
+        self.checked()
+        self.assertEqual(self.js("document.getElementById('verdict').className"), "good")
+        self.enter("/blocks/1/procedure/grid/reference/0", "-5")
+        self.checked()
+        self.assertEqual(self.js("document.getElementById('verdict').className"), "bad")
+        self.assertIn("at least 0", self.js("""[...document.querySelectorAll('main .fault:not([hidden])')].map(e => e.textContent).join('; ')"""))
+        self.key("z", "Control")
+        self.key("z", "Control")
+        self.assertEqual(self.text(), before)
+        self.choose("/blocks/1/level/dimensions/0/path", "/radius_m")
+        self.assertEqual(self.changed_lines(before), [
+            '-         {"name": "reference", "path": "/stiffness_n_per_m", "of": "standard"},',
+            '+         {"name": "reference", "path": "/radius_m", "of": "standard"},'])
+
     def test_a_decision_takes_its_members_along(self):
         self.page(self.copy("ho2000.json"))
         before = self.text()
