@@ -409,16 +409,25 @@ CheckPoint of_trials(const Registration& registered, const StudyData& study) {
           : "the registered " + counted(planned_of(1), "trial", "trials");
   CheckPoint out{"trials", "Number of trials", Finding::as_registered,
                  "Every participant has " + registered_words + "."};
+  int ended = 0;
   for (const StudyParticipant& one : study.participants) {
     const int number = std::max(1, one.person.enrolled_number);
     const std::size_t found = rows_that_count(one.shown).size();
-    if (adaptive ? study::expected_trials(registered.protocol, number, one.shown).complete
-                 : found == planned_of(number))
+    if (adaptive) {
+      const auto expected = study::expected_trials(registered.protocol, number, one.shown);
+      ended += expected.ended_by_program;
+      if (expected.complete) continue;
+    } else if (found == planned_of(number)) {
       continue;
+    }
     out.evidence.push_back(one.person.code + ": " + std::to_string(found) +
                            (adaptive ? " trials, and not at the end of every session"
                                      : " of " + std::to_string(planned_of(number)) + " trials"));
   }
+  if (ended > 0)
+    out.sentence += " In " + counted(static_cast<std::size_t>(ended), "session", "sessions") +
+                    " the last block has fewer trials than its procedure: the program that chooses "
+                    "its levels may end it, and the session's notes say whether it did.";
   if (out.evidence.empty()) return out;
   out.finding = Finding::deviation;
   out.sentence = counted(out.evidence.size(), "participant has", "participants have") +

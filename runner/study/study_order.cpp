@@ -146,8 +146,10 @@ ExpectedTrials expected_trials(const Protocol& all, int participant_number,
   out.complete = true;
   for (int session = 1; session <= protocol.sessions.count; ++session) {
     protocols::SessionPlan plan(protocol, participant_number, session);
+    int last_block = 0;
     for (const ShownTrial& one : shown) {
       if (one.row.session != session || plan.finished()) continue;
+      if (one.row.task) last_block = one.row.task->block;
       // A program may end the blocks that it chooses the levels for.
       while (one.row.task && !plan.finished() && is_level_asked(plan) &&
              plan.next().block < one.row.task->block)
@@ -163,6 +165,10 @@ ExpectedTrials expected_trials(const Protocol& all, int participant_number,
       protocols::TrialOutcome outcome = one.outcome;
       outcome.block = 0;  // other blocks end as their procedures say
       plan.answered(outcome);
+    }
+    if (!plan.finished() && is_level_asked(plan) && plan.next().block == last_block) {
+      plan.end_block();
+      if (plan.finished()) ++out.ended_by_program;
     }
     out.complete = out.complete && plan.finished();
   }

@@ -58,6 +58,9 @@ std::string order_checksum(const protocols::Protocol& protocol, int participant_
 struct ExpectedTrials {
   std::vector<OrderRow> rows;
   bool complete = false;  ///< every session came to its end
+  /// Sessions whose last block, the levels of which a program chooses, has fewer trials than its
+  /// procedure: only the session's notes tell whether the program ended it.
+  int ended_by_program = 0;
 };
 /// \param shown  of the participant, in order
 ExpectedTrials expected_trials(const protocols::Protocol& protocol, int participant_number,
