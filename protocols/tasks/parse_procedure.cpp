@@ -377,7 +377,7 @@ void check_jnd(ObjectReader& reader, const FieldQuestPlus& spec) {
   if (function.form == FieldForm::weber &&
       !(standard + std::ranges::min(spec.parameters[1].values) > 0))
     reader.faults().add(reader.pointer("c"),
-                        "expected more than -" + level_text(standard) +
+                        "expected more than " + level_text(0 - standard) +
                             ": the JND w (S + c) is above 0 at every standard");
 }
 

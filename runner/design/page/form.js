@@ -7,7 +7,7 @@ import {levels_of, names_of, renamed} from './references.js';
 import {is_patch, schema_at} from './schema.js';
 import {hint_in_words, unit_of} from './units.js';
 import {Recoveries} from './recover_view.js';
-import {set_member, settle, written} from './decisions.js';
+import {initial_of, set_member, settle, written, vary_together} from './decisions.js';
 
 const kFirst = ['name', 'title', 'description', 'shape', 'task', 'kind', 'file', 'radius_m', 'height_m', 'edge_m', 'size_m', 'scale', 'stimuli', 'standard', 'level', 'procedure'];
 const kLast = ['version', '$schema'];
@@ -72,14 +72,19 @@ export class Form {
   }
 
   /** Names and numbers that new members of the object at a path may refer to. */
-  naming(path) {
-    const stimuli = names_of(this.values, 'stimuli');
-    const block = path[0] === 'blocks' ? this.values.blocks?.[path[1]] : undefined;
+  naming(path, values = this.values) {
+    const stimuli = names_of(values, 'stimuli');
+    const block = path[0] === 'blocks' ? values.blocks?.[path[1]] : undefined;
     const name = block?.stimuli?.[0] ?? stimuli[0];
-    const stimulus = this.values.stimuli?.find(one => one?.name === name);
-    const merged = stimulus && {...this.values.material, ...stimulus};
-    const level = block?.level?.path?.split('/').slice(1).reduce((value, step) => value?.[step], merged);
-    return {stimuli, levels: stimulus ? levels_of(merged) : [], level: typeof level === 'number' ? level : undefined};
+    const stimulus = values.stimuli?.find(one => one?.name === name);
+    const merged = stimulus && {...values.material, ...stimulus};
+    const number_at = pointer => {
+      const value = pointer?.split?.('/').slice(1).reduce((inner, step) => inner?.[step], merged);
+      return typeof value === 'number' ? value : undefined;
+    };
+    const listed = block?.level?.dimensions, dimensions = Array.isArray(listed) ? listed.filter(one => one?.name) : [];
+    return {stimuli, levels: stimulus ? levels_of(merged) : [], level: number_at(block?.level?.path), has_standard: block?.standard !== undefined,
+      dimensions: dimensions.map(one => ({name: one.name, of: one.of, level: number_at(one.path)}))};
   }
 
   /** The key that says a number's unit: levels have that of the number that varies. */
@@ -153,14 +158,19 @@ export class Form {
   }
 
   #set(path, key, schema) {
-    const naming = this.naming(path), draft = set_member(this.document.text, path, key, this.#initial(path, key, schema));
+    const naming = this.naming(path);
+    if (key === 'dimensions') {
+      this.rebuild(vary_together(this.document.text, this.schema_of, path, naming, text => this.naming(path, JSON.parse(text))), [...path, key]);
+      return;
+    }
+    const draft = set_member(this.document.text, path, key, this.#initial(path, key, schema, naming));
     this.rebuild(settle(draft, this.schema_of, path, new Set(), naming), [...path, key]);
   }
 
   /** JSON to begin a member with: in a group's patch what the protocol says, which a list replaces as a whole. */
-  #initial(path, key, schema) {
+  #initial(path, key, schema, naming) {
     const same = is_patch(path) ? node_at(this.root, [...path.slice(3), key]) : undefined;
-    return same && same.kind !== 'object' ? this.document.text.slice(same.start, same.end) : written(is_patch(path) && same ? {} : schema.initial(key));
+    return same && same.kind !== 'object' ? this.document.text.slice(same.start, same.end) : written(is_patch(path) && same ? {} : initial_of(schema, key, naming));
   }
 
   /** A context of the text as it is now. */
