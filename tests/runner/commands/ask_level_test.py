@@ -399,7 +399,7 @@ class AskDimensions(Asking):
             program.server.close()
             (self.dir / "socket").unlink()
             rows = self.exported(db)[1]
-            self.assertEqual(sum(row["block_name"] == block for row in rows), 7 - 4 * (block == "stairs"))
+            self.assertEqual(sum(row["block_name"] == block for row in rows), 7 - 2 * (block == "stairs"))
             with sqlite3.connect(db) as base:
                 notes = [json.loads(text) for (text,) in base.execute("SELECT text FROM notes") if "block_ended_by_program" in text]
             base.close()
