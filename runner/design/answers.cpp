@@ -171,20 +171,43 @@ Json pictures_of(const std::vector<protocols::StimulusSpec>& stimuli) {
   return out;
 }
 
+/// The members of a row, with levels of factors and dimensions before the level.
+Json flat(const Json& row) {
+  Json out = Json::object();
+  for (const auto& [name, value] : row.items()) {
+    if (name == "level") {
+      for (const char* object : {"factors", "levels"})
+        if (row.contains(object)) out.update(row[object]);
+    }
+    if (name != "orientation_wxyz" && !value.is_object()) out[name] = value;
+  }
+  return out;
+}
+
 /// A table from JSON rows; columns that are empty throughout are left out.
 void put_rows(Json& out, const Json& trials) {
-  std::vector<std::string> columns;
-  const Json first = trials.empty() ? Json::object() : trials.front();
-  for (const auto& [name, value] : first.items()) {
-    const auto has_one = [&key = name](const Json& row) { return !row[key].is_null(); };
-    if (name != "orientation_wxyz" && std::ranges::any_of(trials, has_one)) columns.push_back(name);
+  std::vector<Json> rows;
+  Json all = Json::object();  // in the order of the columns, null where a column is empty
+  for (const Json& trial : trials) {
+    const Json& row = rows.emplace_back(flat(trial));
+    if (row.size() > all.size()) {
+      Json wider = row;
+      for (const auto& [name, value] : all.items())
+        if (!wider.contains(name) || !value.is_null()) wider[name] = value;
+      all = std::move(wider);
+    }
+    for (const auto& [name, value] : row.items())
+      if (!value.is_null()) all[name] = value;
   }
+  std::vector<std::string> columns;
+  for (const auto& [name, value] : all.items())
+    if (!value.is_null()) columns.push_back(name);
   out["columns"] = columns;
   out["rows"] = Json::array();
-  for (const Json& trial : trials) {
+  for (const Json& trial : rows) {
     if (out["rows"].size() == kMostRows) break;
     Json& row = out["rows"].emplace_back(Json::array());
-    for (const std::string& column : columns) row.push_back(trial[column]);
+    for (const std::string& column : columns) row.push_back(trial.value(column, Json()));
   }
   out["all"] = trials.size();
 }

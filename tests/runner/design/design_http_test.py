@@ -163,14 +163,18 @@ class Answers(DesignCase):
 
     def test_the_order_is_that_of_schedule(self):
         self.design(self.copy("quick.json"))
-        for name in ("quick.json", "stiffness-two-groups.json"):
+        for name, varied in (("quick.json", set()), ("stiffness-two-groups.json", {"reference", "stiffness"}),
+                             ("stiffness-surface-size.json", {"surface", "size"})):
             said = subprocess.run([PALPATE, "schedule", PROTOCOLS / name, "--participant", "2", "--format", "json"],
                                   capture_output=True, text=True, timeout=PATIENCE, check=True)
             trials = json.loads(said.stdout)["trials"]
             found = self.ask("schedule", text=(PROTOCOLS / name).read_text(encoding="utf-8"), participant=2)
             self.assertEqual(found["all"], len(trials))
             self.assertEqual([dict(zip(found["columns"], row)) for row in found["rows"]],
-                             [{column: trial[column] for column in found["columns"]} for trial in trials])
+                             [{column: flat.get(column) for column in found["columns"]}
+                              for flat in ({**trial, **trial.get("levels", {}), **trial.get("factors", {})} for trial in trials)])
+            self.assertEqual(len(found["columns"]), len(set(found["columns"])))
+            self.assertLessEqual(varied, set(found["columns"]))
             self.assertEqual(found.get("group"), "older" if "groups" in name else None)
 
     def test_the_picture_has_true_sizes(self):
