@@ -68,15 +68,16 @@ FieldScales scales_with(const std::vector<PointCount>& counts, const FieldModel&
 struct Coordinate {
   std::function<double(double)> value;  ///< of the coordinate, in the parameter's unit
   std::function<double(double)> place;  ///< the inverse
+  double least = -kInfinity;            ///< that the parameter can be
 };
 
 Coordinate positive() {
   return {[](double u) { return std::exp(std::clamp(u, -40.0, 40.0)); },
-          [](double v) { return std::log(std::max(v, 1e-17)); }};
+          [](double v) { return std::log(std::max(v, 1e-17)); }, 0};
 }
 Coordinate above(double least, double unit) {
   return {[=](double u) { return least + unit * std::exp(std::clamp(u, -20.0, 12.0)); },
-          [=](double v) { return std::log(std::max((v - least) / unit, 1e-9)); }};
+          [=](double v) { return std::log(std::max((v - least) / unit, 1e-9)); }, least};
 }
 Coordinate any(double unit) {
   return {[=](double u) { return unit * u; }, [=](double v) { return v / unit; }};
@@ -287,6 +288,7 @@ FieldParameter profiled(const FieldLikelihood& likelihood, const std::vector<dou
   out.ci95 = {end(-1), end(1)};
   const bool low_open = is_open(-1, out.ci95.low), high_open = is_open(1, out.ci95.high);
   out.closed = !low_open && !high_open;
+  if (low_open) out.ci95.low = coordinate.least;
   if (high_open) out.ci95.high = kInfinity;
   return out;
 }

@@ -64,8 +64,8 @@ class FileSink : public TextSink {
 };
 
 /// Compresses into another sink, as a gzip file (RFC 1952) without name and time: a member for each
-/// 512 KiB of text, so that several threads can work on one file. The same text gives the same bytes,
-/// however it is written and by how many threads.
+/// 512 KiB of text, so that several threads can work on one file. The same text gives the same
+/// bytes, however it is written and by how many threads.
 class GzipSink : public TextSink {
  public:
   /// \param jobs  members that are compressed at the same time; 1: in this thread
