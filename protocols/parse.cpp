@@ -416,6 +416,23 @@ void add_group_fault(const Fault& fault, const std::string& group, const json& p
                  fault.expected);
 }
 
+/// Tables have columns for what the protocol's own blocks vary: in a group they vary the same.
+void check_variation(const Protocol& protocol, const Protocol& group, const std::string& name,
+                     const json& patch, FaultList& faults) {
+  for (const TaskBlock& block : group.blocks) {
+    const auto own = std::ranges::find(protocol.blocks, block.name, &TaskBlock::name);
+    const bool same = own == protocol.blocks.end()
+                          ? block.dimensions.empty()
+                          : own->level == block.level && own->dimensions == block.dimensions;
+    if (!same)
+      add_group_fault({"", "/blocks/" + std::to_string(block.place) + "/level",
+                       "expected the level that the block '" + block.name +
+                           "' has without the patch: tables have columns for it",
+                       0},
+                      name, patch, faults);
+  }
+}
+
 /// Makes the protocol of each group.
 void add_group_protocols(const json& root, const std::vector<json>& patches, const MeshFiles& files,
                          FaultList& faults, Protocol& protocol) {
@@ -435,6 +452,7 @@ void add_group_protocols(const json& root, const std::vector<json>& patches, con
         add_group_fault(fault, protocol.groups.names[i], patches[i], faults);
       continue;
     }
+    check_variation(protocol, *group, protocol.groups.names[i], patches[i], faults);
     group->groups = protocol.groups;
     group->source_text = protocol.source_text;
     group->sha256 = protocol.sha256;

@@ -46,6 +46,8 @@ struct LevelTarget {
   std::string pointer;       ///< JSON pointer into the stimulus; "/orientation": degrees about axis
   Vec3 axis{0, 0, 1};        ///< of "/orientation", unit, in the stimulus's frame
   bool orientation = false;  ///< pointer is "/orientation"
+
+  bool operator==(const LevelTarget&) const = default;
 };
 
 /// One of the numbers that are varied together, from trial to trial.
@@ -60,6 +62,7 @@ struct LevelDimension {
   bool applies_to(bool standard) const {
     return of == Of::both || (of == Of::standard) == standard;
   }
+  bool operator==(const LevelDimension&) const = default;
 };
 
 /// "comparison", ...
