@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cstddef>
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "data/base/column_names.h"
 #include "data/base/json_text.h"
 
 namespace palpate::protocols {
@@ -21,8 +21,7 @@ constexpr NumberRange kBlock{1, 100};     // participants of each group
 constexpr std::array kUntouched = {"groups", "factors", "tests", "name", "version", "seed", "cues"};
 
 bool is_group_name(const std::string& text) {
-  std::string lower = text;
-  std::ranges::transform(lower, lower.begin(), [](unsigned char c) { return std::tolower(c); });
+  const std::string lower = lower_case(text);
   // Tables write a missing value, or a person in several groups, by these.
   constexpr std::array kTaken = {"na", "nan", "null", "none", "mixed"};
   if (std::ranges::find(kTaken, lower) != kTaken.end()) return false;

@@ -151,11 +151,15 @@ constexpr std::array kColumnNames = std::to_array<std::string_view>({"adaptation
 
 }  // namespace
 
-bool is_column_name(std::string_view name) {
+std::string lower_case(std::string_view name) {
   std::string small(name);
   std::ranges::transform(small, small.begin(),
                          [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return std::ranges::binary_search(kColumnNames, small);
+  return small;
+}
+
+bool is_column_name(std::string_view name) {
+  return std::ranges::binary_search(kColumnNames, lower_case(name));
 }
 
 }  // namespace palpate

@@ -386,7 +386,7 @@ void read_block_renderers(ObjectReader& reader, const Protocol& protocol, TaskBl
 void read_variation(ObjectReader& reader, const Protocol& protocol, TaskBlock& block) {
   if (block.task == TaskKind::reach)
     return reader.integer("repetitions", block.repetitions, kManyTimes, Presence::required);
-  read_level(reader, block.level, block.dimensions);
+  const bool named = read_level(reader, block.level, block.dimensions);
   check_dimensions(reader, protocol, block);
   const bool varied = reader.has("level");
   if (block.task == TaskKind::adjust) {
@@ -394,7 +394,10 @@ void read_variation(ObjectReader& reader, const Protocol& protocol, TaskBlock& b
     if (!varied) reader.member("level", Presence::required);
     return;
   }
-  read_procedures(reader, block.dimensions, block.procedures);
+  if (named)
+    read_procedures(reader, block.dimensions, block.procedures);
+  else
+    reader.member("procedure");
   const bool procedural = varied || reader.has("procedure");
   if (varied != reader.has("procedure")) {
     reader.faults().add(reader.pointer(varied ? "procedure" : "level"),

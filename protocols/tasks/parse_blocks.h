@@ -16,8 +16,8 @@ namespace palpate::protocols {
 std::optional<ProcedureSpec> read_procedure(ObjectReader& reader,
                                             const std::vector<LevelDimension>& dimensions = {});
 
-/// Reads `level` of a block: one number, or several.
-void read_level(ObjectReader& reader, std::optional<LevelTarget>& number,
+/// Reads `level` of a block: one number, or several. \return whether a procedure can name them
+bool read_level(ObjectReader& reader, std::optional<LevelTarget>& number,
                 std::vector<LevelDimension>& dimensions);
 /// Faults dimensions that the block's task or the protocol's factors do not allow.
 void check_dimensions(ObjectReader& reader, const Protocol& protocol, const TaskBlock& block);

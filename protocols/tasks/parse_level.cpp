@@ -54,9 +54,9 @@ LevelDimension read_dimension(ObjectReader& reader, std::set<std::string>& names
   if (!dimension.name.empty() && is_column_name(dimension.name))
     reader.faults().add(reader.pointer("name"), "expected another name: tables have a column '" +
                                                     dimension.name + "' already");
-  if (!dimension.name.empty() && !names.insert(dimension.name).second)
-    reader.faults().add(reader.pointer("name"),
-                        "expected a unique name, found '" + dimension.name + "' again");
+  if (!dimension.name.empty() && !names.insert(lower_case(dimension.name)).second)
+    reader.faults().add(reader.pointer("name"), "expected a unique name, found '" + dimension.name +
+                                                    "' again; capitals make no difference");
   if (const auto target = read_target(reader)) dimension.target = *target;
   using Of = LevelDimension::Of;
   reader.choice("of", dimension.of,
@@ -96,8 +96,9 @@ void read_dimensions(ObjectReader& level, std::vector<LevelDimension>& dimension
 
 }  // namespace
 
-void read_level(ObjectReader& reader, std::optional<LevelTarget>& number,
+bool read_level(ObjectReader& reader, std::optional<LevelTarget>& number,
                 std::vector<LevelDimension>& dimensions) {
+  bool named = true;
   reader.section("level", [&](ObjectReader& level) {
     if (!level.has("dimensions")) {
       number = read_target(level);
@@ -108,7 +109,10 @@ void read_level(ObjectReader& reader, std::optional<LevelTarget>& number,
       level.faults().add(level.pointer("path"), "expected path or dimensions, not both");
     }
     read_dimensions(level, dimensions);
+    named = !dimensions.empty() &&
+            std::ranges::none_of(dimensions, [](const auto& one) { return one.name.empty(); });
   });
+  return named;
 }
 
 void check_dimensions(ObjectReader& reader, const Protocol& protocol, const TaskBlock& block) {
@@ -136,18 +140,25 @@ void check_dimensions(ObjectReader& reader, const Protocol& protocol, const Task
 }
 
 void check_shared_dimensions(const Protocol& protocol, FaultList& faults) {
-  std::map<std::string, std::pair<std::string, std::string>> units;  // name -> unit, block
+  struct Known {
+    std::string name, unit, block;
+  };
+  std::map<std::string, Known> units;  // by name without capitals
   for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
     const TaskBlock& block = protocol.blocks[i];
     for (std::size_t d = 0; d < block.dimensions.size(); ++d) {
       const LevelDimension& one = block.dimensions[d];
       const std::string unit = unit_of_level(one.target.pointer);
-      const auto& known = units.emplace(one.name, std::pair(unit, block.name)).first->second;
-      if (known.first != unit)
-        faults.add(
-            "/blocks/" + std::to_string(i) + "/level/dimensions/" + std::to_string(d) + "/name",
-            "expected another name: '" + one.name + "' has the unit " + known.first +
-                " in block '" + known.second + "', and tables have one column for it");
+      const Known& known =
+          units.emplace(lower_case(one.name), Known{one.name, unit, block.name}).first->second;
+      const std::string place =
+          "/blocks/" + std::to_string(i) + "/level/dimensions/" + std::to_string(d) + "/name";
+      if (known.unit != unit)
+        faults.add(place, "expected another name: '" + one.name + "' has the unit " + known.unit +
+                              " in block '" + known.block + "', and tables have one column for it");
+      else if (known.name != one.name)
+        faults.add(place, "expected '" + known.name + "', as in block '" + known.block +
+                              "', or another name: capitals make no difference");
     }
   }
 }

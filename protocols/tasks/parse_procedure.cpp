@@ -277,6 +277,19 @@ std::optional<std::size_t> only(const Dimensions& dimensions, Is is) {
   return static_cast<std::size_t>(std::ranges::find_if(dimensions, is) - dimensions.begin());
 }
 
+/// x - S is the difference between the comparison and what it is compared with.
+void check_roles(ObjectReader& reader, const Dimensions& dimensions,
+                 const FieldFunction& function) {
+  const LevelDimension &x = dimensions[function.x], &other = dimensions[function.other];
+  if (x.of == LevelDimension::Of::standard)
+    reader.faults().add(reader.pointer("x"), "expected a dimension of the comparison: '" + x.name +
+                                                 "' is of the standard");
+  const std::string unit = unit_of_level(other.target.pointer);
+  if (unit_of_level(x.target.pointer) != unit)
+    reader.faults().add(reader.pointer("x"), "expected a dimension in " + unit + ", the unit of '" +
+                                                 other.name + "': their difference counts");
+}
+
 void read_places(ObjectReader& reader, const Dimensions& dimensions, FieldFunction& function) {
   const std::size_t before = reader.faults().count();
   const std::size_t wanted = function.form == FieldForm::cues ? 3 : 2;
@@ -311,6 +324,7 @@ void read_places(ObjectReader& reader, const Dimensions& dimensions, FieldFuncti
     if (reader.faults().count() == before && places.size() != wanted)
       reader.faults().add(reader.pointer("standard"),
                           "expected a dimension for each of the form's numbers, found one twice");
+    if (reader.faults().count() == before) check_roles(reader, dimensions, function);
   }
   function.x_scale = dimensions[function.x].scale;
   function.other_scale = dimensions[function.other].scale;
@@ -603,7 +617,19 @@ void read_procedures(ObjectReader& block, const Dimensions& dimensions,
   };
   if (!value->is_array()) return read_one(*value, pointer);
   if (block.array("procedure", 1, kMaxTracks) == nullptr) return;
-  for (std::size_t i = 0; i < value->size(); ++i) read_one((*value)[i], child_pointer(pointer, i));
+  std::optional<FieldFunction> first;
+  for (std::size_t i = 0; i < value->size(); ++i) {
+    const std::size_t before = procedures.size();
+    read_one((*value)[i], child_pointer(pointer, i));
+    const auto* const quest =
+        procedures.size() > before ? std::get_if<FieldQuestPlus>(&procedures.back()) : nullptr;
+    if (quest == nullptr) continue;
+    if (first && !(quest->function == *first))
+      block.faults().add(child_pointer(pointer, i) + "/function",
+                         "expected the function of the block's first QUEST+: one is fitted to all "
+                         "answers");
+    if (!first) first = quest->function;
+  }
 }
 
 }  // namespace palpate::protocols
