@@ -19,7 +19,6 @@ using protocols::FieldFunction;
 using protocols::LevelPoint;
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-constexpr double kUpperQuartileOfNormal = 0.6744897501960817;
 constexpr double kLeastFieldProbability = 1e-12;
 
 /// The scales on which a participant's answers are fitted.
@@ -345,33 +344,37 @@ void add_parameters(const FieldLikelihood& likelihood, const std::vector<double>
                     FieldFit& fit) {
   const FieldForm form = likelihood.model().function.form;
   const std::vector<std::string> names = parameter_names(form);
+  const bool has_jnd = form == FieldForm::weber || form == FieldForm::power;
+  const double middle = likelihood.scales().middle;
+  const auto jnd_of = [form, middle](const std::vector<double>& values) {
+    return protocols::field_jnd(form, values, middle);
+  };
+  const auto with_jnd = [jnd_of](std::vector<double> all, double jnd) {
+    all[0] = 1;
+    all[0] = jnd / jnd_of(all);
+    return all;
+  };
   for (std::size_t k = 0; k < names.size(); ++k) {
     fit.parameters.push_back(profiled(
         likelihood, best, most, k, likelihood.coordinates()[k],
         [k](const std::vector<double>& values) { return values[k]; },
-        [k](double value) -> Completed {
-          return [k, value](std::vector<double> all) {
+        [=](double value) -> Completed {
+          return [=](std::vector<double> all) {
+            // The search is of the JND where c or a is held: w alone would lose it.
+            const double jnd = has_jnd && k == 1 ? jnd_of(all) : 0;
             all[k] = value;
-            return all;
+            return has_jnd && k == 1 ? with_jnd(std::move(all), jnd) : all;
           };
         }));
     fit.parameters.back().name = names[k];
   }
   if (form == FieldForm::weber) open_flat_ends(likelihood.scales(), best, fit.parameters);
-  if (form == FieldForm::weber || form == FieldForm::power) {
-    const double middle = likelihood.scales().middle;
-    const auto jnd_of = [form, middle](const std::vector<double>& values) {
-      return protocols::field_jnd(form, values, middle);
-    };
+  if (has_jnd) {
     // w follows from the JND and the other parameter.
-    fit.jnd = profiled(likelihood, best, most, 0, positive(), jnd_of,
-                       [jnd_of](double value) -> Completed {
-                         return [jnd_of, value](std::vector<double> all) {
-                           all[0] = 1;
-                           all[0] = value / jnd_of(all);
-                           return all;
-                         };
-                       });
+    fit.jnd = profiled(
+        likelihood, best, most, 0, positive(), jnd_of, [with_jnd](double value) -> Completed {
+          return [=](std::vector<double> all) { return with_jnd(std::move(all), value); };
+        });
     fit.jnd->name = "jnd";
   }
   if (best.size() > names.size() + 1) {
@@ -383,31 +386,6 @@ void add_parameters(const FieldLikelihood& likelihood, const std::vector<double>
   fit.parameters.back().name = "lapse";
 }
 
-/// F at a point whose location is free. \param width  slope, or standard deviation of cues
-double share_at_location(const FieldFunction& function, const LevelPoint& point, double location,
-                         double width) {
-  const double sign = function.easier == protocols::Easier::higher ? 1 : -1;
-  const auto normal = [](double z) { return 0.5 * std::erfc(-z / std::sqrt(2.0)); };
-  const double apart = point[function.x] - point[function.other];
-  switch (function.form) {
-    case FieldForm::weber:
-    case FieldForm::power:
-      return normal(sign * kUpperQuartileOfNormal * apart / location);
-    case FieldForm::cues:
-      return normal(sign * (apart - location) / width);
-    default:
-      return protocols::psychometric_share({function.shape, function.x_scale, function.easier},
-                                           sign * (place_of_x(function, point) - location), width);
-  }
-}
-
-/// The parameter that is no location: of threshold forms the slope, of cues s; none: nullopt.
-std::optional<std::size_t> width_of(FieldForm form) {
-  if (form == FieldForm::cues) return 1;
-  if (form == FieldForm::weber || form == FieldForm::power) return std::nullopt;
-  return 0;
-}
-
 FieldMisfit misfit_of(const FieldLikelihood& likelihood, const std::vector<double>& best,
                       double most) {
   FieldMisfit out;
@@ -415,7 +393,7 @@ FieldMisfit misfit_of(const FieldLikelihood& likelihood, const std::vector<doubl
   std::map<double, std::vector<const PointCount*>> places;
   for (const PointCount& count : likelihood.counts())
     places[count.point[place_dimension(function)]].push_back(&count);
-  const std::optional<std::size_t> width = width_of(function.form);
+  const std::optional<std::size_t> width = protocols::width_parameter(function.form);
   const auto locations = likelihood.form_size() - (width ? 1 : 0);
   if (places.size() > kMostMisfitPlaces) {
     out.undefined = "more than " + std::to_string(kMostMisfitPlaces) + " different places";
@@ -452,7 +430,7 @@ FieldMisfit misfit_of(const FieldLikelihood& likelihood, const std::vector<doubl
           own -= log_binomial_part(
               count->trials, count->successes,
               likelihood.with_rates(
-                  share_at_location(function, count->point, of(u), width ? shared[*width] : 1),
+                  field_share_at(function, count->point, of(u), width ? shared[*width] : 1),
                   shared));
         return own;
       };
@@ -506,23 +484,6 @@ std::string no_fit(const std::vector<PointCount>& counts, const FieldModel& mode
 }
 
 }  // namespace
-
-std::size_t place_dimension(const FieldFunction& function) {
-  return function.form == FieldForm::cues ? function.conflict : function.other;
-}
-
-double field_location(const FieldFunction& function, const std::vector<double>& values, double at) {
-  switch (function.form) {
-    case FieldForm::weber:
-    case FieldForm::power:
-      return protocols::field_jnd(function.form, values, at);
-    case FieldForm::cues:
-      return (values[0] - 0.5) * at;
-    default:
-      return protocols::field_threshold(function.form, values,
-                                        protocols::scale_position(function.other_scale, at));
-  }
-}
 
 std::vector<PointCount> sum_by_point(std::vector<PointCount> counts) {
   std::ranges::sort(counts, {}, &PointCount::point);

@@ -77,12 +77,6 @@ struct FieldFit {
 inline constexpr std::size_t kMostMisfitPlaces = 12;
 inline constexpr int kFewestMisfitTrials = 5;
 
-/// The dimension over which a form's location changes: S, x2 or D.
-std::size_t place_dimension(const protocols::FieldFunction& function);
-/// The form's location at a value of that dimension: JND, threshold on the scale of x1, shift.
-double field_location(const protocols::FieldFunction& function, const std::vector<double>& values,
-                      double at);
-
 FieldFit fit_field(const std::vector<PointCount>& counts, const FieldModel& model);
 
 }  // namespace palpate::analysis

@@ -42,31 +42,56 @@ double field_jnd(FieldForm form, const std::vector<double>& parameters, double s
   return parameters[0] * portable_exp(parameters[1] * portable_log(standard));
 }
 
-double field_threshold(FieldForm form, const std::vector<double>& parameters, double x2) {
-  const double bend = form == FieldForm::threshold_parabola ? parameters[3] : 0;
+std::size_t place_dimension(const FieldFunction& function) {
+  return function.form == FieldForm::cues ? function.conflict : function.other;
+}
+
+double field_location(const FieldFunction& function, const std::vector<double>& parameters,
+                      double at) {
+  switch (function.form) {
+    case FieldForm::weber:
+    case FieldForm::power:
+      return field_jnd(function.form, parameters, at);
+    case FieldForm::cues:
+      return (parameters[0] - 0.5) * at;
+    case FieldForm::threshold_line:
+    case FieldForm::threshold_parabola:
+      break;
+  }
+  const double x2 = scale_position(function.other_scale, at);
+  const double bend = function.form == FieldForm::threshold_parabola ? parameters[3] : 0;
   return parameters[1] + parameters[2] * x2 + bend * x2 * x2;
 }
 
-double field_share(const FieldFunction& function, const std::vector<double>& parameters,
-                   const LevelPoint& point) {
+std::optional<std::size_t> width_parameter(FieldForm form) {
+  if (form == FieldForm::weber || form == FieldForm::power) return std::nullopt;
+  return form == FieldForm::cues ? 1 : 0;
+}
+
+double field_share_at(const FieldFunction& function, const LevelPoint& point, double location,
+                      double width) {
   const double sign = function.easier == Easier::higher ? 1 : -1;
   const double x = point[function.x], other = point[function.other];
   switch (function.form) {
     case FieldForm::weber:
     case FieldForm::power:
-      return portable_normal_cdf(sign * kUpperQuartile * (x - other) /
-                                 field_jnd(function.form, parameters, other));
+      return portable_normal_cdf(sign * kUpperQuartile * (x - other) / location);
     case FieldForm::cues:
-      return portable_normal_cdf(
-          sign * (x - other - (parameters[0] - 0.5) * point[function.conflict]) / parameters[1]);
+      return portable_normal_cdf(sign * (x - other - location) / width);
     case FieldForm::threshold_line:
     case FieldForm::threshold_parabola:
       break;
   }
-  const double t =
-      field_threshold(function.form, parameters, scale_position(function.other_scale, other));
   const PsychometricFunction along{function.shape, function.x_scale, function.easier};
-  return psychometric_share(along, sign * (scale_position(function.x_scale, x) - t), parameters[0]);
+  return psychometric_share(along, sign * (scale_position(function.x_scale, x) - location), width);
+}
+
+double field_share(const FieldFunction& function, const std::vector<double>& parameters,
+                   const LevelPoint& point) {
+  const std::optional<std::size_t> width = width_parameter(function.form);
+  return field_share_at(function, point,
+                        field_location(function, parameters, point[place_dimension(function)]),
+                        width ? parameters[*width] : 1);
 }
 
 double field_success(const FieldFunction& function, const std::vector<double>& parameters,

@@ -3,6 +3,7 @@
 // point.
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -44,6 +45,18 @@ struct FieldFunction {
   bool operator==(const FieldFunction&) const = default;
 };
 
+/// The dimension over which the form's location changes: S, x2 or D.
+std::size_t place_dimension(const FieldFunction& function);
+/// The form's location where that dimension has a value: JND, threshold on the scale of x1, shift.
+double field_location(const FieldFunction& function, const std::vector<double>& parameters,
+                      double at);
+/// The parameter that is no part of the location: of threshold forms the slope, of cues s; none:
+/// nullopt.
+std::optional<std::size_t> width_parameter(FieldForm form);
+/// F at a point, whatever the location there. \param width  value of that parameter
+double field_share_at(const FieldFunction& function, const LevelPoint& point, double location,
+                      double width);
+
 /// F, without guess and lapse, at a point. \param parameters  as parameter_names
 double field_share(const FieldFunction& function, const std::vector<double>& parameters,
                    const LevelPoint& point);
@@ -53,7 +66,5 @@ double field_success(const FieldFunction& function, const std::vector<double>& p
                      const LevelPoint& point);
 /// The JND at a standard, in its unit. \pre weber or power
 double field_jnd(FieldForm form, const std::vector<double>& parameters, double standard);
-/// t of a threshold form, on the scale of x1. \param x2  on its scale
-double field_threshold(FieldForm form, const std::vector<double>& parameters, double x2);
 
 }  // namespace palpate::protocols

@@ -198,6 +198,48 @@ TEST(FieldFit, AConstantJndLeavesWAndCOpen) {
   EXPECT_TRUE(fit.jnd->closed);
 }
 
+// The profile of c by brute force: at each c the likeliest w and lapse of a grid.
+TEST(FieldFit, IntervalsOfAFlatFitAreTheProfiles) {
+  constexpr double kHalf = 0.5 * 3.841458820694124;
+  int flat = 0;
+  for (const std::uint64_t seed : {4, 5, 6, 7, 8, 9}) {
+    SCOPED_TRACE(seed);
+    FieldFunction truth;
+    truth.form = FieldForm::power;
+    const auto counts = answers_of(truth, {30, 0.1, 0.02}, 80, seed);
+    const FieldFit fit = fit_field(counts, {});
+    ASSERT_EQ(fit.undefined, "");
+    const FieldParameter &w = parameter(fit, "w"), &c = parameter(fit, "c");
+    flat += c.value > 20 * fit.middle ? 1 : 0;
+    for (const double at : {-10.0, 0.0, 100.0, 1000.0, 5000.0}) {
+      double most = -1e9;
+      for (int i = 0; i < 240; ++i)
+        for (const double lapse : {1e-9, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06})
+          most = std::max(most,
+                          log_likelihood_of({}, {1e-3 * std::pow(1.04, i), at, lapse}, counts, {}));
+      const double loss = fit.log_likelihood - most;
+      if (loss < kHalf - 0.1) {
+        EXPECT_LE(c.ci95.low, at) << loss;
+        EXPECT_GE(c.ci95.high, at) << loss;
+      } else if (loss > kHalf + 0.1) {
+        EXPECT_FALSE(c.ci95.low < at && at < c.ci95.high) << at << " " << loss;
+      }
+    }
+    for (const double at : {0.03, 0.1, 0.3, 1.0, 3.0}) {
+      double most = -1e9;
+      for (int i = 0; i < 240; ++i)
+        for (const double lapse : {1e-9, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06})
+          most = std::max(
+              most,
+              log_likelihood_of({}, {at, -19.99 + 0.01 * std::pow(1.06, i), lapse}, counts, {}));
+      const double loss = fit.log_likelihood - most;
+      if (loss < kHalf - 0.1) EXPECT_GE(w.ci95.high, at) << loss;
+      if (loss > kHalf + 0.1) EXPECT_FALSE(w.ci95.low < at && at < w.ci95.high) << at;
+    }
+  }
+  EXPECT_GT(flat, 0);
+}
+
 TEST(FieldFit, SaysWhyThereIsNone) {
   EXPECT_EQ(fit_field({}, {}).undefined, "no answers");
   EXPECT_EQ(fit_field({{{100, 120}, 5, 5}, {{200, 300}, 5, 5}}, {}).undefined,
