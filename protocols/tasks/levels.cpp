@@ -87,26 +87,6 @@ double guesses_of(const TaskBlock& block, const TypicalSettings& settings, bool 
   return both_sides ? settings.lapse : 1.0 / block.intervals;
 }
 
-}  // namespace
-
-std::string level_text(double level) {
-  char text[32];
-  return {text, std::to_chars(text, text + sizeof text, level).ptr};
-}
-
-std::string number_in_words(const std::string& path, double number) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.4g", number);
-  const std::string unit = path.empty() ? "1" : unit_of_level(path);
-  return level_text(std::strtod(text, nullptr)) + (unit == "1" ? "" : " " + unit);
-}
-
-std::string level_in_words(const TaskBlock& block, double level) {
-  return number_in_words(block.level ? block.level->pointer : "", level);
-}
-
-namespace {
-
 struct VariedNumber {
   const LevelTarget& target;
   double value;
@@ -144,7 +124,48 @@ StimulusSpec with_numbers(const Protocol& protocol, int stimulus,
   return varied;
 }
 
+/// The stimuli of a block's points, each once: of the standard and of what is compared with it.
+/// \param visit  called with stimulus, point and whether it is the standard
+template <class Visit>
+void for_each_stimulus_at_points(const TaskBlock& block, Visit visit) {
+  const std::vector<LevelPoint> points = points_of(block);
+  for (const bool standard : {false, true}) {
+    std::vector<int> stimuli = block.stimuli;
+    if (standard) {
+      stimuli.clear();
+      if (block.standard_of.empty() && block.standard) stimuli.push_back(*block.standard);
+      for (const auto& [cell, of_cell] : block.standard_of) {
+        if (std::ranges::find(stimuli, of_cell) == stimuli.end()) stimuli.push_back(of_cell);
+      }
+    }
+    std::set<LevelPoint> shown;
+    for (const LevelPoint& point : points) {
+      LevelPoint own;
+      for (std::size_t d = 0; d < point.size(); ++d)
+        if (block.dimensions[d].applies_to(standard)) own.push_back(point[d]);
+      if (own.empty() || !shown.insert(own).second) continue;
+      for (const int stimulus : stimuli) visit(stimulus, point, standard);
+    }
+  }
+}
+
 }  // namespace
+
+std::string level_text(double level) {
+  char text[32];
+  return {text, std::to_chars(text, text + sizeof text, level).ptr};
+}
+
+std::string number_in_words(const std::string& path, double number) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.4g", number);
+  const std::string unit = path.empty() ? "1" : unit_of_level(path);
+  return level_text(std::strtod(text, nullptr)) + (unit == "1" ? "" : " " + unit);
+}
+
+std::string level_in_words(const TaskBlock& block, double level) {
+  return number_in_words(block.level ? block.level->pointer : "", level);
+}
 
 StimulusSpec at_level(const Protocol& protocol, const TaskBlock& block, int stimulus,
                       double level) {
@@ -307,35 +328,6 @@ int side_of_levels(const Protocol& protocol, const TaskBlock& block) {
   if (levels.front() >= *standard && levels.back() > *standard) return 1;
   return levels.back() <= *standard && levels.front() < *standard ? -1 : 0;
 }
-
-namespace {
-
-/// The stimuli of a block's points, each once: of the standard and of what is compared with it.
-/// \param visit  called with stimulus, point and whether it is the standard
-template <class Visit>
-void for_each_stimulus_at_points(const TaskBlock& block, Visit visit) {
-  const std::vector<LevelPoint> points = points_of(block);
-  for (const bool standard : {false, true}) {
-    std::vector<int> stimuli = block.stimuli;
-    if (standard) {
-      stimuli.clear();
-      if (block.standard_of.empty() && block.standard) stimuli.push_back(*block.standard);
-      for (const auto& [cell, of_cell] : block.standard_of) {
-        if (std::ranges::find(stimuli, of_cell) == stimuli.end()) stimuli.push_back(of_cell);
-      }
-    }
-    std::set<LevelPoint> shown;
-    for (const LevelPoint& point : points) {
-      LevelPoint own;
-      for (std::size_t d = 0; d < point.size(); ++d)
-        if (block.dimensions[d].applies_to(standard)) own.push_back(point[d]);
-      if (own.empty() || !shown.insert(own).second) continue;
-      for (const int stimulus : stimuli) visit(stimulus, point, standard);
-    }
-  }
-}
-
-}  // namespace
 
 Protocol with_all_levels(const Protocol& protocol) {
   Protocol all = protocol;
