@@ -627,6 +627,66 @@ Table confidence_table(const StudyAnalysis& analysis) {
   return table;
 }
 
+Table field_table(const TaskCell& cell, const std::string& label) {
+  const bool fitted = cell.field && cell.field->undefined.empty();
+  std::vector<std::string> header{"participant", "trials"};
+  std::vector<std::string> names;
+  if (fitted) {
+    for (const ParticipantField& one : cell.field->participants) {
+      for (const FieldParameter& parameter : one.fit.parameters)
+        if (std::ranges::find(names, parameter.name) == names.end())
+          names.push_back(parameter.name);
+    }
+    if (cell.field->has_jnd()) names.emplace_back("jnd");
+  }
+  for (const std::string& name : names) {
+    const std::string unit = unit_of_parameter(*cell.field, name);
+    header.push_back((name == "jnd" ? "JND" : name) + (unit.empty() ? "" : " (" + unit + ")"));
+    header.emplace_back("95 % interval");
+  }
+  for (const char* const more : {"deviance", "df", "p", "remark"}) header.emplace_back(more);
+  Table table = table_of(cell, "Functions of several dimensions", label, header);
+  if (!fitted) return table;
+  for (const ParticipantField& one : cell.field->participants) {
+    auto& row = table.rows.emplace_back(
+        std::vector<std::string>{printable(one.participant), std::to_string(one.fit.trials)});
+    std::string open;
+    for (const std::string& name : names) {
+      const FieldParameter* found = name == "jnd" && one.fit.jnd ? &*one.fit.jnd : nullptr;
+      for (const FieldParameter& parameter : one.fit.parameters)
+        if (parameter.name == name) found = &parameter;
+      row.push_back(found != nullptr ? short_number(found->value) : kMissing);
+      row.push_back(found != nullptr
+                        ? short_number(found->ci95.low) + " to " + short_number(found->ci95.high)
+                        : kMissing);
+      if (found != nullptr && !found->closed && name != "lapse" && name != "guess")
+        open += (open.empty() ? "" : ", ") + name;
+    }
+    const FieldMisfit& misfit = one.fit.misfit;
+    const bool tested = one.fit.undefined.empty() && misfit.undefined.empty();
+    row.push_back(tested ? short_number(misfit.deviance) : kMissing);
+    row.push_back(tested ? std::to_string(misfit.df) : kMissing);
+    row.push_back(tested ? p_text(misfit.p) : kMissing);
+    std::string remark = one.fit.undefined;
+    if (!open.empty()) remark = "not determined: " + open;
+    if (tested && misfit.p < kMisfitLevel) remark += remark.empty() ? "MISFIT" : "; MISFIT";
+    row.push_back(remark);
+  }
+  table.notes = {
+      std::string("Form ") + to_string(cell.field->function.form) +
+      ", by maximum likelihood, with intervals by the profile likelihood. JND: at the median of "
+      "the standards. Deviance: against a free value at every place of the other dimension; a "
+      "small p "
+      "says that the form does not hold."};
+  if (cell.field->p)
+    table.notes.push_back("Over " + counted(cell.field->tested, "participant", "participants") +
+                          ": deviance " + short_number(cell.field->deviance) + " on " +
+                          std::to_string(cell.field->df) + " degrees of freedom, " +
+                          p_phrase(*cell.field->p) +
+                          (*cell.field->p < kMisfitLevel ? ": MISFIT." : "."));
+  return table;
+}
+
 }  // namespace
 
 std::string stimulus_of(const std::string& task, const std::string& block,
@@ -753,70 +813,6 @@ std::string conclusion(const StudyAnalysis& analysis) {
   text.pop_back();
   return text;
 }
-
-namespace {
-
-Table field_table(const TaskCell& cell, const std::string& label) {
-  const bool fitted = cell.field && cell.field->undefined.empty();
-  std::vector<std::string> header{"participant", "trials"};
-  std::vector<std::string> names;
-  if (fitted) {
-    for (const ParticipantField& one : cell.field->participants) {
-      for (const FieldParameter& parameter : one.fit.parameters)
-        if (std::ranges::find(names, parameter.name) == names.end())
-          names.push_back(parameter.name);
-    }
-    if (cell.field->has_jnd()) names.emplace_back("jnd");
-  }
-  for (const std::string& name : names) {
-    const std::string unit = unit_of_parameter(*cell.field, name);
-    header.push_back((name == "jnd" ? "JND" : name) + (unit.empty() ? "" : " (" + unit + ")"));
-    header.emplace_back("95 % interval");
-  }
-  for (const char* const more : {"deviance", "df", "p", "remark"}) header.emplace_back(more);
-  Table table = table_of(cell, "Functions of several dimensions", label, header);
-  if (!fitted) return table;
-  for (const ParticipantField& one : cell.field->participants) {
-    auto& row = table.rows.emplace_back(
-        std::vector<std::string>{printable(one.participant), std::to_string(one.fit.trials)});
-    std::string open;
-    for (const std::string& name : names) {
-      const FieldParameter* found = name == "jnd" && one.fit.jnd ? &*one.fit.jnd : nullptr;
-      for (const FieldParameter& parameter : one.fit.parameters)
-        if (parameter.name == name) found = &parameter;
-      row.push_back(found != nullptr ? short_number(found->value) : kMissing);
-      row.push_back(found != nullptr
-                        ? short_number(found->ci95.low) + " to " + short_number(found->ci95.high)
-                        : kMissing);
-      if (found != nullptr && !found->closed && name != "lapse" && name != "guess")
-        open += (open.empty() ? "" : ", ") + name;
-    }
-    const FieldMisfit& misfit = one.fit.misfit;
-    const bool tested = one.fit.undefined.empty() && misfit.undefined.empty();
-    row.push_back(tested ? short_number(misfit.deviance) : kMissing);
-    row.push_back(tested ? std::to_string(misfit.df) : kMissing);
-    row.push_back(tested ? p_text(misfit.p) : kMissing);
-    std::string remark = one.fit.undefined;
-    if (!open.empty()) remark = "not determined: " + open;
-    if (tested && misfit.p < kMisfitLevel) remark += remark.empty() ? "MISFIT" : "; MISFIT";
-    row.push_back(remark);
-  }
-  table.notes = {
-      std::string("Form ") + to_string(cell.field->function.form) +
-      ", by maximum likelihood, with intervals by the profile likelihood. JND: at the median of "
-      "the "
-      "standards. Deviance: against a free value at every place of the other dimension; a small p "
-      "says that the form does not hold."};
-  if (cell.field->p)
-    table.notes.push_back("Over " + counted(cell.field->tested, "participant", "participants") +
-                          ": deviance " + short_number(cell.field->deviance) + " on " +
-                          std::to_string(cell.field->df) + " degrees of freedom, " +
-                          p_phrase(*cell.field->p) +
-                          (*cell.field->p < kMisfitLevel ? ": MISFIT." : "."));
-  return table;
-}
-
-}  // namespace
 
 std::vector<Table> cell_tables(const TaskCell& cell, const std::string& label) {
   std::vector<Table> tables{functions_table(cell, label),

@@ -108,6 +108,12 @@ std::uint64_t number_of(const std::string& name) {
   return hash;
 }
 
+/// JSON pointer of the number that a block's answers are about; "": nothing is varied.
+std::string varied_path(const protocols::TaskBlock& block) {
+  if (block.level) return block.level->pointer;
+  return block.dimensions.empty() ? "" : protocols::judged_dimension(block).target.pointer;
+}
+
 }  // namespace
 
 bool have_one_form(const stimuli::ObjectSpec& a, const stimuli::ObjectSpec& b) {
@@ -137,16 +143,6 @@ bool differ_in_stiffness(const protocols::Protocol& protocol, const protocols::T
   }
   return block.stimuli.size() > 1;
 }
-
-namespace {
-
-/// JSON pointer of the number that a block's answers are about; "": nothing is varied.
-std::string varied_path(const protocols::TaskBlock& block) {
-  if (block.level) return block.level->pointer;
-  return block.dimensions.empty() ? "" : protocols::judged_dimension(block).target.pointer;
-}
-
-}  // namespace
 
 void LevelPercept::begin(const protocols::Trial& trial, const protocols::Interval& interval) {
   const auto& block = protocols::block_of(protocol_, trial);

@@ -112,6 +112,32 @@ int open_socket(const std::string& path, std::string& trouble) {
   return -1;
 }
 
+/// What may be answered about a trial.
+AdvisorJson range_json(const protocols::TaskBlock& block, const protocols::Trial& next) {
+  AdvisorJson out;
+  if (block.dimensions.empty()) {
+    const std::vector<double> levels = protocols::levels_of(block);
+    out["path"] = block.level->pointer;
+    out["least"] = levels.front();
+    out["most"] = levels.back();
+    out["own"] = *next.level;
+    return out;
+  }
+  const std::vector<protocols::DimensionRange> ranges = protocols::ranges_of(block);
+  out["dimensions"] = AdvisorJson::array();
+  for (std::size_t d = 0; d < ranges.size(); ++d) {
+    const protocols::LevelDimension& one = block.dimensions[d];
+    out["dimensions"].push_back({{"name", one.name},
+                                 {"path", one.target.pointer},
+                                 {"of", protocols::to_string(one.of)},
+                                 {"scale", to_string(one.scale)},
+                                 {"least", ranges[d].min},
+                                 {"most", ranges[d].max}});
+    out["own"][one.name] = next.point[d];
+  }
+  return out;
+}
+
 }  // namespace
 
 std::string socket_fault(const std::string& path) {
@@ -286,36 +312,6 @@ std::optional<Proposal> SocketAdvisor::proposal_in(const std::string& line,
              protocols::level_text(levels.back()) + found;
   return std::nullopt;
 }
-
-namespace {
-
-/// What may be answered about a trial.
-AdvisorJson range_json(const protocols::TaskBlock& block, const protocols::Trial& next) {
-  AdvisorJson out;
-  if (block.dimensions.empty()) {
-    const std::vector<double> levels = protocols::levels_of(block);
-    out["path"] = block.level->pointer;
-    out["least"] = levels.front();
-    out["most"] = levels.back();
-    out["own"] = *next.level;
-    return out;
-  }
-  const std::vector<protocols::DimensionRange> ranges = protocols::ranges_of(block);
-  out["dimensions"] = AdvisorJson::array();
-  for (std::size_t d = 0; d < ranges.size(); ++d) {
-    const protocols::LevelDimension& one = block.dimensions[d];
-    out["dimensions"].push_back({{"name", one.name},
-                                 {"path", one.target.pointer},
-                                 {"of", protocols::to_string(one.of)},
-                                 {"scale", to_string(one.scale)},
-                                 {"least", ranges[d].min},
-                                 {"most", ranges[d].max}});
-    out["own"][one.name] = next.point[d];
-  }
-  return out;
-}
-
-}  // namespace
 
 std::optional<Proposal> SocketAdvisor::ask(const protocols::Trial& next) {
   trouble_.clear();
