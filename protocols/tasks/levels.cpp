@@ -130,14 +130,7 @@ template <class Visit>
 void for_each_stimulus_at_points(const TaskBlock& block, Visit visit) {
   const std::vector<LevelPoint> points = points_of(block);
   for (const bool standard : {false, true}) {
-    std::vector<int> stimuli = block.stimuli;
-    if (standard) {
-      stimuli.clear();
-      if (block.standard_of.empty() && block.standard) stimuli.push_back(*block.standard);
-      for (const auto& [cell, of_cell] : block.standard_of) {
-        if (std::ranges::find(stimuli, of_cell) == stimuli.end()) stimuli.push_back(of_cell);
-      }
-    }
+    const std::vector<int> stimuli = varied_stimuli(block, standard);
     std::set<LevelPoint> shown;
     for (const LevelPoint& point : points) {
       LevelPoint own;
@@ -197,6 +190,17 @@ StimulusSpec shown_stimulus(const Protocol& protocol, const TaskBlock& block,
   if (interval.level && block.level)
     return at_level(protocol, block, interval.stimulus, *interval.level);
   return protocol.stimuli[static_cast<std::size_t>(interval.stimulus)];
+}
+
+std::vector<int> varied_stimuli(const TaskBlock& block, bool standard) {
+  if (!standard) return block.stimuli;
+  if (block.standard_of.empty())
+    return block.standard ? std::vector<int>{*block.standard} : std::vector<int>{};
+  std::vector<int> stimuli;
+  for (const auto& [cell, of_cell] : block.standard_of) {
+    if (std::ranges::find(stimuli, of_cell) == stimuli.end()) stimuli.push_back(of_cell);
+  }
+  return stimuli;
 }
 
 std::vector<LevelTarget> targets_of(const TaskBlock& block) {

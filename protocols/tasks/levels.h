@@ -31,6 +31,10 @@ StimulusSpec shown_stimulus(const Protocol& protocol, const TaskBlock& block,
 /// The numbers of a stimulus that the block varies: of its level, or of its dimensions.
 std::vector<LevelTarget> targets_of(const TaskBlock& block);
 
+/// The stimuli of a block whose numbers can be varied: those that are shown, or, of a comparison,
+/// its standards, each once.
+std::vector<int> varied_stimuli(const TaskBlock& block, bool standard);
+
 /// The dimension that answers are about: the first of the comparison.
 /// \pre the block has dimensions
 const LevelDimension& judged_dimension(const TaskBlock& block);

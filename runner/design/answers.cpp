@@ -1,18 +1,10 @@
 #include "runner/design/answers.h"
 
 #include <algorithm>
-#include <array>
-#include <cstddef>
 #include <cstdint>
-#include <glm/common.hpp>
-#include <glm/gtc/quaternion.hpp>
-#include <glm/trigonometric.hpp>
-#include <limits>
-#include <set>
 #include <utility>
 #include <vector>
 
-#include "data/base/cell_name.h"
 #include "data/base/json_text.h"
 #include "protocols/groups.h"
 #include "protocols/parse.h"
@@ -20,12 +12,10 @@
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
 #include "protocols/tasks/texts.h"
-#include "runner/design/surface_marks.h"
 #include "runner/scene_builder.h"
 #include "runner/station/protocol_check.h"
 #include "runner/study/task_words.h"
 #include "runner/touch/checked_meshes.h"
-#include "runner/touch/trial_page.h"
 #include "runner/usage_error.h"
 #include "stimuli/polygon_soup.h"
 
@@ -35,12 +25,7 @@ namespace {
 using Json = nlohmann::ordered_json;
 using protocols::Protocol;
 
-constexpr std::size_t kMostTriangles = 12000;  // of all stimuli together
-constexpr std::size_t kMostRows = 2000;        // of an order
-
-Json as_json(const Vec3& v) {
-  return {static_cast<float>(v.x), static_cast<float>(v.y), static_cast<float>(v.z)};
-}
+constexpr std::size_t kMostRows = 2000;  // of an order
 
 /// \throws protocols::InputError with every fault
 void require_meshes(const Protocol& protocol, const std::string& path, SceneBuilder& builder) {
@@ -68,105 +53,6 @@ Json in_words(const Protocol& protocol) {
   Json out = Json::array();
   for (const protocols::TaskBlock& block : protocol.blocks) {
     if (!block.name.empty()) out.push_back({block.name, study::in_words(protocol, block)});
-  }
-  return out;
-}
-
-void put_mesh(const touch::PictureMesh& mesh, Json& out) {
-  out["corners"] = Json::array();
-  Vec3 low(std::numeric_limits<double>::max()), high(-std::numeric_limits<double>::max());
-  for (const Vec3& corner : mesh.corners) {
-    low = glm::min(low, corner);
-    high = glm::max(high, corner);
-    out["corners"].push_back(as_json(corner));
-  }
-  out["triangles"] = mesh.triangles;
-  out["size_m"] = as_json(high - low);
-}
-
-/// "/fields/0" as a picture needs it.
-Json as_json(const stimuli::FieldSpec& field) {
-  using Kind = stimuli::FieldSpec::Kind;
-  constexpr std::array kNames = {"constant", "spring", "channel", "viscous", "curl", "vibration"};
-  Json out{{"kind", kNames[static_cast<std::size_t>(field.kind)]}};
-  switch (field.kind) {
-    case Kind::constant:
-      out["force_n"] = as_json(field.force);
-      break;
-    case Kind::channel:
-      out["to_m"] = as_json(field.to);
-      [[fallthrough]];
-    case Kind::spring:
-      out["centre_m"] = as_json(field.centre);
-      out["radius_m"] = field.radius;
-      break;
-    case Kind::curl:
-      out["turns"] = field.damping[0][0] < 0 ? -1 : field.damping[0][0] > 0 ? 1 : 0;
-      [[fallthrough]];
-    case Kind::vibration:
-      out["axis"] = as_json(field.axis);
-      break;
-    case Kind::viscous:
-      out["resists"] = field.damping != decltype(field.damping){};
-      break;
-  }
-  return out;
-}
-
-Json marks_of(const stimuli::ObjectSpec& object, const touch::PictureMesh& mesh) {
-  SceneBuilder builder;
-  const auto texture = builder.texture_of(object);
-  if (!texture) return nullptr;
-  const SurfaceMarks marks = surface_marks(object, *texture, mesh.corners, mesh.triangles);
-  Json out{{"every", marks.every}, {"lines", Json::array()}, {"dots", Json::array()}};
-  for (const auto& [from, to] : marks.lines) out["lines"].push_back({as_json(from), as_json(to)});
-  for (const Vec3& dot : marks.dots) out["dots"].push_back(as_json(dot));
-  return out;
-}
-
-/// What is seen, if it looks other than what is felt; null: it does not.
-Json seen_of(const protocols::StimulusSpec& stimulus, std::size_t most) {
-  if (!stimulus.seen || !stimulus.seen->object) return nullptr;
-  const protocols::SeenSpec& seen = *stimulus.seen;
-  const bool moved = seen.size_ratio != 1 || seen.turn_deg != 0 || seen.offset != Vec3(0);
-  if (!seen.shape && !moved && stimulus.felt) return nullptr;
-  const stimuli::ObjectSpec& object = seen.shape ? *seen.shape : stimulus.object;
-  if (object.shape == stimuli::ShapeKind::none) return nullptr;
-  touch::PictureMesh mesh = touch::picture_mesh(object, most);
-  const Quat turn = glm::angleAxis(glm::radians(seen.turn_deg), seen.axis);
-  for (Vec3& corner : mesh.corners) corner = turn * (seen.size_ratio * corner);
-  Json out;
-  put_mesh(mesh, out);
-  return out;
-}
-
-/// A stimulus in a cell that looks like one that is shown already is left out.
-Json picture_of(const stimuli::ObjectSpec& object, std::size_t most) {
-  Json out{{"corners", Json::array()}, {"triangles", Json::array()}};
-  for (const stimuli::FieldSpec& field : object.fields) out["fields"].push_back(as_json(field));
-  if (object.shape == stimuli::ShapeKind::none) return out;
-  const touch::PictureMesh mesh = touch::picture_mesh(object, most);
-  put_mesh(mesh, out);
-  if (Json marks = marks_of(object, mesh); !marks.is_null()) out["marks"] = std::move(marks);
-  // Primitives look the same with fewer.
-  if (object.shape == stimuli::ShapeKind::mesh && mesh.all_triangles > mesh.triangles.size())
-    out["all_triangles"] = mesh.all_triangles;
-  return out;
-}
-
-Json pictures_of(const std::vector<protocols::StimulusSpec>& stimuli) {
-  Json out = Json::array();
-  std::set<std::string> known;
-  for (const protocols::StimulusSpec& stimulus : stimuli) {
-    const std::size_t most = kMostTriangles / stimuli.size() + 1;
-    Json picture = picture_of(stimulus.object, most);
-    if (Json seen = seen_of(stimulus, most); !seen.is_null()) picture["seen"] = std::move(seen);
-    const std::string base = base_name(stimulus.name);
-    const bool is_new = known.insert(base + picture.dump()).second;
-    if (!is_new && base != stimulus.name) continue;
-    picture["name"] = stimulus.name;
-    picture["place"] = stimulus.place;
-    out.push_back(std::move(picture));
   }
   return out;
 }
@@ -272,18 +158,6 @@ Json check_answer(const std::string& text, const std::string& path, BuiltShapes&
     for (const std::string& fault : error.faults()) faults.push_back({path, "", fault});
   }
   return station::faults_json(path, faults);
-}
-
-Json picture_answer(const std::string& text, const std::string& path) {
-  const Protocol protocol = protocols::parse_protocol_text(text, path);
-  Json out;
-  out["stimuli"] = pictures_of(protocol.stimuli);
-  Json& stylus = out["stylus"];
-  stylus = {{"length_m", protocol.stylus.length}, {"grip_m", protocol.stylus.grip}};
-  for (const protocols::ToolSegmentSpec& segment : protocol.tool.segments)
-    stylus["segments"].push_back({as_json(segment.from), as_json(segment.to)});
-  if (protocol.reach) stylus["reach"] = protocol.reach->factor;
-  return out;
 }
 
 Json recover_answer(const std::string& text, const std::string& path, const std::string& block,

@@ -28,13 +28,6 @@ class BuiltShapes {
 nlohmann::ordered_json check_answer(const std::string& text, const std::string& path,
                                     BuiltShapes& shapes);
 
-/// The surfaces of the stimuli in their own frames, m, with what is drawn on and about them, and
-/// the stylus that touches them: {"stimuli": [{"name", "corners", "triangles", "size_m", "marks":
-/// as surface_marks, "fields": [...], "seen": another shape, place or size, as a stimulus}],
-/// "stylus":
-/// {...}}. \throws as parse_protocol_text
-nlohmann::ordered_json picture_answer(const std::string& text, const std::string& path);
-
 /// What 'palpate schedule --recover' finds of the procedures of a block: {"procedures": [...]}.
 /// \throws as parse_protocol_text; UsageError: they find no threshold
 nlohmann::ordered_json recover_answer(const std::string& text, const std::string& path,

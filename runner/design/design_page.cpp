@@ -12,6 +12,7 @@
 #include "protocols/parse.h"
 #include "runner/design/beside.h"
 #include "runner/design/page_assets.h"
+#include "runner/design/pictures.h"
 #include "runner/design/study_data.h"
 #include "runner/serve/loopback.h"
 #include "runner/usage_error.h"

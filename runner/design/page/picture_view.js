@@ -4,7 +4,7 @@ import {by_id, element} from './dom.js';
 import {extent_of, put_dot, put_field, put_rod, put_waves} from './solids.js';
 import {label_of, value_in_words} from './units.js';
 
-const {add, sub, times, size, surface_of, axes_of, painter, kLight, kDark} = palpate_drawing;
+const {add, sub, times, size, frame, joined, surface_of, axes_of, painter, kLight, kDark} = palpate_drawing;
 const kGap = 0.14;    // of the largest stimulus
 const kFoot = 34;     // px below a row, for names
 const kHead = 26;     // px above all, for the scale
@@ -64,6 +64,27 @@ function parts_of({corners = [], triangles = [], marks, fields = []}, {colour, o
   return {parts, radius};
 }
 
+/** The last key of a JSON pointer: "size_m" of "/size_m/0". */
+const key_of = path => path.split('/').filter(part => part && !/^\d+$/.test(part)).at(-1) ?? path;
+/** The key of a number that levels vary: a turn is in degrees. */
+const varied_key = path => (path === '/orientation' ? 'turn_deg' : key_of(path));
+/** "size 20 mm", of such a number. */
+function number_in_words({name, path, value, least, most}) {
+  const key = varied_key(path);
+  const [from, to] = [value ?? least, value ?? most].map(one => value_in_words(key, one));
+  return `${name?.replaceAll('_', ' ') ?? label_of(key)} ${from === to ? from : `${from} to ${to}`}`;
+}
+
+/** "varied: radius 20 mm to 30 mm (practice, size)": the levels of a stimulus, blocks with the same levels together. */
+export function levels_in_words(varied = []) {
+  const blocks = new Map();
+  for (const {block, group, numbers} of varied) {
+    const words = numbers.map(number_in_words).join(', ');
+    blocks.set(words, [...blocks.get(words) ?? [], group ? `${block} of group ${group}` : block]);
+  }
+  return [...blocks].map(([words, of]) => `varied: ${words} (${of.join(', ')})`);
+}
+
 const in_mm = metres => metres.map(m => +(1000 * m).toPrecision(3)).join(' × ') + ' mm';
 
 export class PictureView {
@@ -98,21 +119,25 @@ export class PictureView {
     });
   }
 
-  /** Shows an answer of "picture". `stimuli`: as the protocol has them, for what a picture cannot show. */
-  show({stimuli: drawn, stylus}, protocol_stimuli) {
-    const known = new Map(protocol_stimuli.map(one => [one?.name, stimulus_in_words(one ?? {})]));
-    const heard = new Set(protocol_stimuli.filter(one => one?.sound).map(one => one.name));
-    const base = name => name.replace(/\[.*/, '');
-    const stimuli = drawn.filter(one => known.has(base(one.name)));  // channels of a reach have no place of their own
-    this.shapes = stimuli.flatMap(one => [{name: one.name, size: one.size_m, ...parts_of(one, {sounds: heard.has(base(one.name))})},
-      ...(one.seen ? [{name: `${one.name}, as seen`, label: 'as seen', size: one.seen.size_m, ...parts_of(one.seen, {colour: 'ideal', opacity: kGhost})}] : [])]).filter(one => one.parts.length > 0);
+  /** Shows an answer of "picture". `written`: the stimuli of the file, for what a picture cannot show. */
+  show({stimuli, stylus}, written) {
+    const of_file = new Map(written.map(one => [one?.name, one ?? {}]));
+    this.shapes = stimuli.flatMap(one => {
+      const sounds = Boolean((one.written ?? of_file.get(one.name))?.sound);
+      const at = one.at?.map(number_in_words).join(', '), name = [one.name, one.group, at].filter(Boolean).join(', ');
+      const turn = one.turn_wxyz && frame([0, 0, 0, ...one.turn_wxyz]);
+      return [{name, label: one.at?.map(({path, value}) => value_in_words(varied_key(path), value)).join(', '), size: one.size_m, turn, ...parts_of(one, {sounds})},
+        ...(one.seen ? [{name: `${name}, as seen`, label: 'as seen', size: one.seen.size_m, turn, ...parts_of(one.seen, {colour: 'ideal', opacity: kGhost})}] : [])];
+    }).filter(one => one.parts.length > 0);
     this.stylus = stylus;
     this.root.querySelector('.sizes').replaceChildren(...stimuli.map(one => {
-      const words = [one.size_m ? in_mm(one.size_m) : 'no surface', ...(known.get(base(one.name)) ?? [])];
+      const words = [one.size_m ? in_mm(one.size_m) : 'no surface'];
+      if (one.at) words.unshift(one.at.map(number_in_words).join(', '));
+      else words.push(...stimulus_in_words(one.written ?? of_file.get(one.name) ?? {}), ...levels_in_words(one.varied));
       if (one.seen) words.push(`seen as ${in_mm(one.seen.size_m)}`);
       if (one.marks?.every > 1) words.push(`every ${one.marks.every}th ridge is drawn`);
       if (one.all_triangles) words.push(`drawn with ${one.triangles.length} of its ${one.all_triangles} triangles`);
-      return element('li', {}, element('b', {text: one.name}), ` ${words.join('; ')}`);
+      return element('li', {}, element('b', {text: one.group ? `${one.name}, group ${one.group}` : one.name}), ` ${words.join('; ')}`);
     }));
     const note = this.root.querySelector('.note');
     note.hidden = Boolean(this.paint);
@@ -151,10 +176,11 @@ export class PictureView {
     this.shapes.forEach((shape, i) => {
       const row = Math.floor(i / columns), in_row = Math.min(columns, this.shapes.length - row * columns);
       const o = [-w / 2 + cell * (0.5 + (i % columns) + (columns - in_row) / 2), 0, ((rows - 1) / 2 - row) * row_height + kFoot / scale / 2 - down];
-      shape.parts.forEach(part => objects.push({...part, object: {...turned, o}}));
+      const object = shape.turn ? joined({...turned, o}, shape.turn) : {...turned, o};
+      shape.parts.forEach(part => objects.push({...part, object}));
       const [x, y] = to_px([o[0], 0, o[2] - shape.radius]);
       if (cell * scale < kLeastLabel) return;
-      labels.push(element('span', {text: shape.label ?? shape.name}));
+      labels.push(element('span', {text: shape.label ?? shape.name, title: shape.name}));
       labels.at(-1).style.maxWidth = `${cell * scale}px`;
       place(labels.at(-1), x, Math.min(y + 2, height - 18));
     });

@@ -351,6 +351,39 @@ class Views(BrowserCase):
             self.assertEqual(f"{one['name']}, as seen" in names, bool(other), one)
         self.assertEqual(self.complaints(), [])
 
+    def test_levels_are_drawn_and_in_words(self):
+        path = self.copy("size-questplus.json")
+        self.page(path)
+        self.assertEqual(self.js("design.picture.shapes.map(one => one.name)"),
+                         ["standard", "comparison", "comparison, radius 25.5 mm", "comparison, radius 35 mm"])
+        self.assertEqual(self.js("[...document.querySelectorAll('#picture .labels span')].slice(0, 4).map(one => one.textContent)"),
+                         ["standard", "comparison", "25.5 mm", "35 mm"])
+        radii = self.js("design.picture.shapes.map(one => one.radius)")
+        for got, wanted in zip(radii, (0.025, 0.025, 0.0255, 0.035)):
+            self.assertAlmostEqual(got, wanted, delta=1e-4)
+        words = self.js("[...document.querySelectorAll('#picture .sizes li')].map(one => one.textContent)")
+        self.assertEqual(len(words), 4)
+        self.assertIn("varied: radius 35 mm (practice); varied: radius 25.5 mm to 35 mm (size)", words[1])
+        self.assertEqual(words[3], "comparison radius 35 mm; 70 × 70 × 70 mm")
+        values = json.loads(path.read_text())
+        values["stimuli"] = [{"name": name, "shape": "box", "size_m": [0.01, 0.06, 0.02]} for name in ("standard", "comparison")]
+        for block in values["blocks"]:
+            block["level"] = {"path": "/orientation", "axis": [0, 0, 1]}
+            block["procedure"] = {"kind": "constant", "levels": [0, 90], "repetitions": 2}
+        self.set_text(json.dumps(values, indent=1))
+        self.checked()
+        self.wait_for("design.picture.shapes.length === 3")
+        # From the front the box is as wide as its x, and turned as its y.
+        surface = "(r, g, b) => b - r > 15"
+        self.js("""Object.assign(design.picture.turn, {yaw: 0, pitch: 0}), window.all = design.picture.shapes,
+                   design.picture.stylus.segments = []""")
+        wide = []
+        for i in (1, 2):
+            self.js(f"design.picture.shapes = [all[{i}]]")
+            wide.append(self.drawn(surface))
+        self.assertAlmostEqual(wide[1] / wide[0], 6, delta=0.6)
+        self.assertEqual(self.complaints(), [])
+
     def test_sounds_and_viscous_fields_are_drawn(self):
         path = self.copy("tap-hardness.json")
         values = json.loads(path.read_text())

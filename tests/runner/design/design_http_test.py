@@ -192,7 +192,7 @@ class Answers(DesignCase):
 
     def test_fields_textures_and_what_is_seen_are_in_the_picture(self):
         self.design(self.copy("grating-roughness.json"))
-        shown = {one["name"]: one for one in self.ask("picture", text=(self.dir / "p.json").read_text())["stimuli"]}
+        shown = {one["name"]: one for one in self.ask("picture", text=(self.dir / "p.json").read_text())["stimuli"] if "at" not in one}
         text = json.loads((self.dir / "p.json").read_text())
         ridged = next(one for one in text["stimuli"] if "texture" in one)
         period = ridged["texture"]["period_m"]
@@ -230,6 +230,67 @@ class Answers(DesignCase):
         self.assertEqual(shown["free"]["corners"], [])
         self.assertAlmostEqual(shown["large"]["seen"]["size_m"][0], 0.06, delta=0.001)
         self.assertNotIn("seen", shown["same"])
+
+    def pictures(self, made):
+        return self.ask("picture", text=json.dumps(made))["stimuli"]
+
+    def test_levels_that_look_other_are_in_the_picture(self):
+        path = self.copy("size-questplus.json")
+        self.design(path)
+        levels = json.loads(path.read_text())["blocks"][1]["procedure"]["levels"]
+        shown = self.ask("picture", text=path.read_text())["stimuli"]
+        self.assertEqual([(one["name"], [at["value"] for at in one.get("at", [])]) for one in shown],
+                         [("standard", []), ("comparison", []), ("comparison", [min(levels)]), ("comparison", [max(levels)])])
+        for one in shown:
+            radius = one["at"][0]["value"] if "at" in one else 0.025
+            self.assertAlmostEqual(one["size_m"][0], 2 * radius, delta=2e-4)
+        self.assertNotIn("varied", shown[0])
+        self.assertEqual({range["block"]: range["numbers"] for range in shown[1]["varied"]}["size"],
+                         [{"path": "/radius_m", "least": min(levels), "most": max(levels)}])
+        made = {"version": 2, "name": "made", "renderers": ["point"], "orientation": "fixed",
+                "stimuli": [{"name": "block", "shape": "box", "size_m": [0.02, 0.03, 0.04]}, {"name": "other", "shape": "sphere", "radius_m": 0.02}],
+                "blocks": [{"name": "a", "task": "rate", "question": "How?", "stimuli": ["block"], "scale": [{"label": "a"}, {"label": "b"}],
+                            "level": {"dimensions": [{"name": "wide", "path": "/size_m/0"}, {"name": "high", "path": "/size_m/2"}]},
+                            "procedure": {"kind": "constant", "levels": [[0.01, 0.05], [0.03, 0.02], [0.02, 0.03]], "repetitions": 1}}]}
+        # The least and the greatest of each number, at points that are shown.
+        shown = self.pictures(made)
+        ends = sorted(tuple(at["value"] for at in one["at"]) for one in shown if "at" in one)
+        self.assertEqual(ends, [(0.01, 0.05), (0.03, 0.02)])
+        for one in shown:
+            if "at" in one:
+                self.assertEqual([round(side, 6) for side in one["size_m"]], [one["at"][0]["value"], 0.03, one["at"][1]["value"]])
+        self.assertEqual([number["name"] for number in shown[0]["varied"][0]["numbers"]], ["wide", "high"])
+        # A stiffness looks like nothing: it is in words alone.
+        block = made["blocks"][0]
+        block["level"], block["procedure"] = {"path": "/stiffness_n_per_m"}, {"kind": "constant", "levels": [100, 300], "repetitions": 1}
+        shown = self.pictures(made)
+        self.assertEqual([one["name"] for one in shown], ["block", "other"])
+        self.assertEqual(shown[0]["varied"], [{"block": "a", "numbers": [{"path": "/stiffness_n_per_m", "least": 100, "most": 300}]}])
+        # A turn turns.
+        block["level"], block["procedure"]["levels"] = {"path": "/orientation", "axis": [0, 0, 1]}, [0, 90]
+        shown = [one for one in self.pictures(made) if "at" in one]
+        self.assertEqual([one["at"][0]["value"] for one in shown], [90])
+        for got, wanted in zip(shown[0]["turn_wxyz"], (math.sqrt(0.5), 0, 0, math.sqrt(0.5))):
+            self.assertAlmostEqual(got, wanted)
+
+    def test_what_a_group_feels_otherwise_is_in_the_picture(self):
+        self.design(self.copy("quick.json"))
+        ball = {"name": "ball", "shape": "sphere", "radius_m": 0.02}
+        block = {"name": "a", "task": "rate", "question": "How?", "stimuli": ["ball"], "scale": [{"label": "a"}, {"label": "b"}],
+                 "level": {"path": "/radius_m"}, "procedure": {"kind": "constant", "levels": [0.02, 0.03], "repetitions": 1}}
+        other = {**block, "procedure": {"kind": "constant", "levels": [0.02, 0.04], "repetitions": 1}}
+        made = {"version": 2, "name": "made", "renderers": ["point"], "orientation": "fixed", "stimuli": [ball],
+                "blocks": [{**{key: value for key, value in block.items() if key not in ("level", "procedure")}, "repetitions": 1}],
+                "groups": {"names": ["near", "far"], "assign": "balanced",
+                           "patch": {"far": {"stimuli": [{"name": "ball", "shape": "cube", "edge_m": 0.05}]}}}}
+        shown = self.pictures(made)
+        self.assertEqual([(one.get("group"), one.get("written", ball)["shape"]) for one in shown], [(None, "sphere"), ("far", "cube")])
+        made["blocks"] = [block]
+        made["groups"]["patch"]["far"] = {"blocks": [other]}
+        shown = self.pictures(made)
+        self.assertEqual([(one.get("group"), [at["value"] for at in one.get("at", [])]) for one in shown],
+                         [(None, []), (None, [0.03]), ("far", [0.04])])
+        self.assertEqual([(range.get("group"), range["numbers"][0]["most"]) for range in shown[0]["varied"]], [(None, 0.03), ("far", 0.04)])
 
     def test_shapes_are_built_once_and_files_are_read_again(self):
         path = self.copy("size-questplus.json")
