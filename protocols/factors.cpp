@@ -14,6 +14,7 @@
 #include "data/base/cell_name.h"
 #include "data/base/column_names.h"
 #include "data/base/json_text.h"
+#include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
 #include "protocols/tasks/parse_blocks.h"
 
@@ -372,7 +373,7 @@ void Cells::check_sets(const TaskBlock& block) {
       tell(sets[i].place, "expected \"mixing\": \"blocked\" in block '" + block.name +
                               "': a block's own keys cannot change from trial to trial");
     for (const char* const key :
-         {"/stimuli", "/standard", "/factors", "/mixing", "/task", "/session", "/practice",
+         {"/stimuli", "/standard", "/factors", "/mixing", "/shared", "/task", "/session", "/practice",
           "/absent", "/level", "/keys", "/procedure", "/renderers",
           // What an answer means: cells are compared.
           "/asks", "/answer", "/intervals", "/scale", "/min", "/max", "/modulus", "/answers",
@@ -463,12 +464,21 @@ void read_factors(ObjectReader& reader, Protocol& protocol) {
 
 void read_crossing(ObjectReader& reader, const Protocol& protocol, TaskBlock& block) {
   reader.choice("mixing", block.cells_apart, {{"mixed", false}, {"blocked", true}});
+  reader.boolean("shared", block.cells_share_tracks);
   const json* const value = reader.member("factors");
   if (value == nullptr) {
     if (reader.has("mixing"))
       reader.faults().add(reader.pointer("mixing"), "expected the factors whose cells it mixes");
+    if (reader.has("shared"))
+      reader.faults().add(reader.pointer("shared"),
+                          "expected the factors whose cells share tracks");
     return;
   }
+  if (block.cells_share_tracks && (block.cells_apart || !is_adaptive(block)))
+    reader.faults().add(reader.pointer("shared"),
+                        block.cells_apart
+                            ? "expected no shared tracks with \"mixing\": \"blocked\""
+                            : "expected a procedure: without one no track goes on over cells");
   if (!(value->is_array() || value->is_object()) || value->empty()) {
     reader.faults().add(reader.pointer("factors"),
                         "expected a list of factors, or an object of a list of levels for each" +

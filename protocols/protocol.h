@@ -151,6 +151,7 @@ struct TaskBlock {
   std::vector<CrossedFactor> factors{};
   bool cells_apart = false;         ///< one after the other; else every trial may be of any cell
   std::optional<std::size_t> cell;  ///< of the factors, apart from the other cells
+  bool cells_share_tracks = false;  ///< a track goes on over all cells; else each has its own
   BlockOrder order = BlockOrder::own;
   TaskKind task = TaskKind::identify;
   int session = 1;

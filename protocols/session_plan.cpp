@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "protocols/factors.h"
 #include "protocols/groups.h"
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/block_tracks.h"
@@ -113,11 +114,17 @@ bool SessionPlan::criterion_met() const {
          criterion_->correct;
 }
 
+int SessionPlan::stimulus_of_shared(std::size_t track) const {
+  const std::size_t cells = cells_of(block()), answered = tracks_->tracks()[track].history().size();
+  return cells_in_round(block(), protocol_->seed, participant_number_, track,
+                        answered / cells)[answered % cells];
+}
+
 Trial SessionPlan::adaptive_trial() const {
   const TrackLevel wanted = *tracks_->next();
   const BlockTrack track = tracks_of(block())[wanted.track];
   Trial trial;
-  trial.stimulus = track.stimulus;
+  trial.stimulus = block().cells_share_tracks ? stimulus_of_shared(wanted.track) : track.stimulus;
   trial.renderer = track.renderer;
   trial.track = first_track(block()) + static_cast<int>(wanted.track);
   if (wanted.point.empty()) trial.level = wanted.level;

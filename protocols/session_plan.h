@@ -94,6 +94,7 @@ class SessionPlan {
   bool sequence_continues();
   bool criterion_met() const;
   void find_next();
+  int stimulus_of_shared(std::size_t track) const;
   Trial adaptive_trial() const;
   long long most_in_sequence() const;
   /// Of the sequences after this one. \param trials_of  a block

@@ -625,6 +625,13 @@ std::string procedures_key(const std::string& protocol_sha256, const std::string
   return group.empty() ? protocol_sha256 : protocol_sha256 + "/" + group;
 }
 
+const protocols::BlockProcedures* block_of(const StudyTrial& trial, const StudyTable& table) {
+  const auto protocol = table.procedures.find(procedures_key(trial.protocol_sha256, trial.group));
+  if (protocol == table.procedures.end()) return nullptr;
+  const auto block = protocol->second.find(trial.block_name);
+  return block == protocol->second.end() ? nullptr : &block->second;
+}
+
 void put_protocols(const std::vector<ProtocolText>& protocols, const std::string& path,
                    StudyTable& table) {
   std::vector<std::string> groups;
@@ -640,6 +647,10 @@ void put_protocols(const std::vector<ProtocolText>& protocols, const std::string
   }
   label_groups(groups, table);
   note_factors_of_trials(table);
+  for (StudyTrial& trial : table.trials) {
+    const protocols::BlockProcedures* const block = block_of(trial, table);
+    if (block != nullptr && block->cells_share_tracks) trial.shape = base_name(trial.shape);
+  }
 }
 
 namespace {

@@ -56,8 +56,11 @@ struct StudyTable {
 /// The protocol of a group, by its SHA-256 and the group's name; "": without groups.
 std::string procedures_key(const std::string& protocol_sha256, const std::string& group);
 
-/// Adds to trials what their protocols say of them: procedures, title, groups and factors.
-/// \param path  of the source, for messages
+/// The procedure of a trial's block; nullptr: the source has no protocol.
+const protocols::BlockProcedures* block_of(const StudyTrial& trial, const StudyTable& table);
+
+/// Adds to trials what their protocols say of them: procedures, title, groups and factors. Trials
+/// of a track that cells share are of its plain stimulus. \param path  of the source, for messages
 void put_protocols(const std::vector<ProtocolText>& protocols, const std::string& path,
                    StudyTable& table);
 

@@ -760,13 +760,6 @@ InformationTransfer information_transfer(const CountTable& counts) {
   return result;
 }
 
-const protocols::BlockProcedures* block_of(const StudyTrial& trial, const StudyTable& table) {
-  const auto protocol = table.procedures.find(procedures_key(trial.protocol_sha256, trial.group));
-  if (protocol == table.procedures.end()) return nullptr;
-  const auto block = protocol->second.find(trial.block_name);
-  return block == protocol->second.end() ? nullptr : &block->second;
-}
-
 std::vector<Track> tracks_of(const std::vector<const StudyTrial*>& trials,
                              const StudyTable& table) {
   std::map<std::string, std::vector<const StudyTrial*>> named;

@@ -123,9 +123,6 @@ struct TrackProcedure {
   std::optional<double> target, fitted_level;
 };
 
-/// The procedure of a trial's block; nullptr: the source has no protocol.
-const protocols::BlockProcedures* block_of(const StudyTrial& trial, const StudyTable& table);
-
 /// The trials of a track in order, those without an answer left out.
 struct Track {
   std::string name;

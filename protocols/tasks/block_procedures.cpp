@@ -67,6 +67,7 @@ std::map<std::string, BlockProcedures> procedures_of_blocks(const std::string& t
       procedures.tracks_of_cell = count_of(one, "stimuli", 1) *
                                   count_of(one, "renderers", count_of(root, "renderers", 1)) *
                                   std::max<std::size_t>(1, procedures.specs.size());
+    block.boolean("shared", procedures.cells_share_tracks);
     block.choice("asks", procedures.asks_smaller, {{"larger", false}, {"smaller", true}});
     const nlohmann::json::json_pointer path("/level/path");
     if (one.is_object() && one.contains(path) && one[path].is_string())

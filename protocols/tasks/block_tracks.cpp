@@ -3,7 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <span>
 #include <utility>
+
+#include "protocols/factors.h"
 
 namespace palpate::protocols {
 namespace {
@@ -23,6 +26,12 @@ int in_cell(const std::map<int, int>& of_cells, int stimulus, std::optional<int>
   return found != of_cells.end() ? found->second : plain.value_or(-1);
 }
 
+/// How many stimuli have tracks of their own, the first of the block: those of its first cell,
+/// where cells share tracks.
+std::size_t stimuli_with_tracks(const TaskBlock& block) {
+  return block.stimuli.size() / (block.cells_share_tracks ? cells_of(block) : 1);
+}
+
 }  // namespace
 
 Random task_stream(std::uint64_t seed, int participant, std::uint64_t block, TaskUse use,
@@ -32,7 +41,7 @@ Random task_stream(std::uint64_t seed, int participant, std::uint64_t block, Tas
 
 std::vector<BlockTrack> tracks_of(const TaskBlock& block) {
   std::vector<BlockTrack> tracks;
-  for (const int stimulus : block.stimuli) {
+  for (const int stimulus : std::span(block.stimuli).first(stimuli_with_tracks(block))) {
     for (const RendererKind renderer : block.renderers) {
       if (block.procedures.empty()) tracks.push_back({stimulus, renderer, nullptr});
       for (const ProcedureSpec& procedure : block.procedures)
@@ -40,6 +49,18 @@ std::vector<BlockTrack> tracks_of(const TaskBlock& block) {
     }
   }
   return tracks;
+}
+
+std::vector<int> cells_in_round(const TaskBlock& block, std::uint64_t seed, int participant,
+                                std::size_t track, std::uint64_t round) {
+  const std::size_t own = stimuli_with_tracks(block);
+  const std::size_t of_stimulus = tracks_of(block).size() / own;
+  std::vector<int> cells;
+  for (std::size_t i = track / of_stimulus; i < block.stimuli.size(); i += own)
+    cells.push_back(block.stimuli[i]);
+  Random random = task_stream(seed, participant, stream_of(block), kTaskCells, track);
+  for (std::uint64_t i = 0; i <= round; ++i) random.shuffle(cells);
+  return cells;
 }
 
 int first_track(const TaskBlock& block) {

@@ -14,13 +14,19 @@ namespace palpate::protocols {
 
 /// The stimulus, renderer and procedure of a track.
 struct BlockTrack {
-  int stimulus = 0;
+  int stimulus = 0;  ///< of tracks that cells share: in the first cell
   RendererKind renderer = RendererKind::point;
   const ProcedureSpec* procedure = nullptr;  ///< of the block; nullptr: none
 };
 
 /// The tracks in order of their numbers, from 1: the procedure varies fastest.
 std::vector<BlockTrack> tracks_of(const TaskBlock& block);
+
+/// The stimuli of a track that cells share, one of each cell, in the order of one of its rounds of
+/// as many answered trials. \pre block.cells_share_tracks
+/// \param seed  of the protocol \param track  index into tracks_of(block) \param round  from 0
+std::vector<int> cells_in_round(const TaskBlock& block, std::uint64_t seed, int participant,
+                                std::size_t track, std::uint64_t round);
 
 /// The number of the first track: the cells of a block number theirs together.
 int first_track(const TaskBlock& block);
@@ -41,7 +47,8 @@ enum TaskUse : std::uint64_t {
   kTaskPosition = 2,
   kTaskOrientation = 3,
   kTaskCatch = 4,
-  kTaskTracks = 5
+  kTaskTracks = 5,
+  kTaskCells = 6
 };
 /// The number of a block's random streams: its place, or one of its own for a cell apart, so that a
 /// block has the same streams whatever factors others cross.

@@ -299,11 +299,14 @@ PlannedConditions conditions_of(const Protocol& protocol, const analysis::PlanRe
     if (block.practice || std::ranges::find(names, measure) == names.end()) continue;
     const auto index = static_cast<int>(i);
     if (out.blocks.empty()) out.first_stimuli = {block.stimuli.front()};
-    if (out.factor.empty() && !block.factors.empty())
+    if (out.factor.empty() && !block.factors.empty() && !block.cells_share_tracks)
       out.factor = protocol.factors[block.factors.front().factor].name;
     out.blocks.push_back(index);
     renderers.insert(block.renderers.begin(), block.renderers.end());
-    for (const int stimulus : block.stimuli) cells.emplace(index, stimulus);
+    // The figures of tracks that cells share are of all cells.
+    const std::size_t apart = block.cells_share_tracks ? protocols::cells_of(block) : 1;
+    for (std::size_t s = 0; s < block.stimuli.size() / apart; ++s)
+      cells.emplace(index, block.stimuli[s]);
   }
   out.contrast = contrast_of(plan);
   if (out.contrast != PlannedContrast::conditions) {

@@ -557,12 +557,14 @@ class TaskAnswers final : public StudyAnswers {
 
   /// "factor surface (smooth, rough), in block stiffness: cells mixed."
   std::string levels_of(const protocols::Factor& factor) const {
-    std::vector<std::string> levels, mixed, apart;
+    std::vector<std::string> levels, mixed, apart, shared;
     for (const protocols::FactorLevel& level : factor.levels) levels.push_back(level.name);
     for (const TaskBlock* block : blocks_) {
       for (const protocols::CrossedFactor& crossed : block->factors) {
         if (&protocol_.factors[crossed.factor] == &factor)
-          add_once(block->name, block->cells_apart ? apart : mixed);
+          add_once(block->name, block->cells_apart          ? apart
+                                : block->cells_share_tracks ? shared
+                                                            : mixed);
       }
     }
     std::string out = "factor " + factor.name + " (" + joined(levels) + ")";
@@ -570,6 +572,9 @@ class TaskAnswers final : public StudyAnswers {
     if (!apart.empty())
       out += "; one cell after the other, in the order of a Williams' square, in " +
              blocks_in_words(apart);
+    if (!shared.empty())
+      out += "; balanced in the tracks of " + blocks_in_words(shared) +
+             ", whose figures are of all its levels";
     return out + "; what each level sets is in the protocol.";
   }
 

@@ -421,6 +421,7 @@ std::vector<std::string> in_words(const protocols::Protocol& protocol,
         head += (level == crossed.levels.front() ? "" : ", ") + factor.levels[level].name;
       head += ")";
     }
+    if (block.cells_share_tracks) head += ", tracks shared by all cells";
   }
   if (block.reaching) {
     const protocols::ReachingSpec& reaching = *block.reaching;

@@ -193,6 +193,60 @@ TEST(Factors, TracksOfCellsAreTheirOwn) {
   }
 }
 
+TEST(Factors, SharedTracksGoOverAllCells) {
+  json study = crossed_study("stairs");
+  study["blocks"][1]["shared"] = true;
+  ASSERT_EQ(study["blocks"][1]["name"], "stairs");
+  const Protocol protocol = parsed(study);
+  const BlockProcedures procedures =
+      procedures_of_blocks(protocol.source_text, "study.json").at("stairs");
+  std::map<int, std::vector<Response>> answers;
+  std::map<int, std::vector<int>> stimuli;
+  for (const Trial& trial : of_block(protocol, 2, "stairs")) {
+    const TrialOutcome outcome = answer_to(trial);
+    if (!outcome.answered || trial.catch_trial) continue;
+    stimuli[trial.track].push_back(trial.stimulus);
+    answers[trial.track].push_back({*trial.level, outcome.success});
+  }
+  ASSERT_EQ(answers.size(), 2U);
+  std::set<std::vector<int>> orders;
+  for (const auto& [track, own] : answers) {
+    Procedure again = procedures.begin(2, track);
+    for (const Response& answer : own) {
+      ASSERT_EQ(*again.next_level(), answer.level) << "track " << track;
+      again.record(answer);
+    }
+    const std::vector<int>& shown = stimuli[track];
+    ASSERT_GE(shown.size(), 12U);
+    for (std::size_t round = 0; round + 6 <= shown.size(); round += 6) {
+      const std::vector<int> cells(shown.begin() + round, shown.begin() + round + 6);
+      EXPECT_EQ(std::set<int>(cells.begin(), cells.end()).size(), 6U) << "each cell once";
+      orders.insert(cells);
+    }
+  }
+  EXPECT_GT(orders.size(), 2U);
+  study["blocks"][1].erase("shared");
+  const Protocol apart = parsed(study);
+  for (const char* const other : {"constant"}) {
+    const auto lines = [&](const Protocol& of) {
+      std::vector<std::pair<int, std::optional<double>>> out;
+      for (const Trial& trial : of_block(of, 2, other))
+        out.emplace_back(trial.stimulus, trial.level);
+      return out;
+    };
+    EXPECT_EQ(lines(protocol), lines(apart)) << "no other block changes";
+  }
+  study["blocks"][1]["shared"] = true;
+  study["blocks"][1]["mixing"] = "blocked";
+  EXPECT_EQ(faults_of(study), std::vector<std::string>{"/blocks/1/shared"});
+  json constant = crossed_study("constant");
+  constant["blocks"][0]["shared"] = true;
+  EXPECT_EQ(faults_of(constant), std::vector<std::string>{"/blocks/0/shared"});
+  json plain = task_study();
+  plain["blocks"][0]["shared"] = false;
+  EXPECT_EQ(faults_of(plain), std::vector<std::string>{"/blocks/0/shared"});
+}
+
 TEST(Factors, ABlockMayTakeSomeLevels) {
   json study = crossed_study("constant");
   study["blocks"][0]["factors"] = {{"size", {"l", "s"}}};
