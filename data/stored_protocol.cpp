@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "data/base/json_text.h"
 
@@ -70,6 +71,36 @@ void read_factors(const nlohmann::json& protocol, std::vector<StoredFactor>& to)
   }
 }
 
+/// The levels of a factor that a block crosses; empty: it does not.
+std::vector<std::string> crossed_levels(const nlohmann::json& crossed, const StoredFactor& factor) {
+  std::vector<std::string> out;
+  if (crossed.is_object()) {
+    read_texts(crossed, factor.name.c_str(), out);
+  } else if (crossed.is_array() &&
+             std::find(crossed.begin(), crossed.end(), factor.name) != crossed.end()) {
+    for (const auto& [level, set] : factor.levels) out.push_back(level);
+  }
+  return out;
+}
+
+void read_cells(const nlohmann::json& json, const std::vector<StoredFactor>& factors,
+                StoredBlock& block) {
+  if (!json.is_object() || !json.contains("factors")) return;
+  if (json.contains("shared") && json["shared"] == true) return;
+  for (const StoredFactor& factor : factors) {
+    const std::vector<std::string> levels = crossed_levels(json["factors"], factor);
+    if (levels.empty()) continue;
+    if (block.cells.empty()) block.cells.emplace_back();
+    auto crossed = std::exchange(block.cells, {});
+    for (const auto& cell : crossed) {
+      for (const std::string& level : levels) {
+        block.cells.push_back(cell);
+        block.cells.back().emplace_back(factor.name, level);
+      }
+    }
+  }
+}
+
 GroupAssignment read_groups(const nlohmann::json& protocol) {
   using Rule = GroupAssignment::Rule;
   GroupAssignment out;
@@ -121,6 +152,7 @@ StoredProtocol read_stored_protocol(const std::string& text) {
   for (const auto& one : list_of(json, "blocks")) {
     StoredBlock& block = out.blocks.emplace_back(read_block(one));
     if (block.renderers.empty()) block.renderers = renderers;
+    read_cells(one, out.factors, block);
   }
   return out;
 }

@@ -17,6 +17,9 @@ struct StoredBlock {
   bool practice = false;
   std::vector<std::string> renderers, stimuli;  ///< names, in the block's order
   std::vector<std::string> dimensions = {};     ///< names; empty: the level is one number, or none
+  /// Of the factors that it crosses, the factor and level of each in each cell, the last factor's
+  /// levels innermost. Empty: none, or tracks go on over all cells.
+  std::vector<std::vector<std::pair<std::string, std::string>>> cells = {};
 };
 
 /// A question of a page whose answer describes the participant: age, sex, handedness.

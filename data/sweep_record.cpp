@@ -5,6 +5,7 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
+#include "data/base/cell_name.h"
 #include "data/base/json_text.h"
 #include "data/stored_protocol.h"
 
@@ -75,6 +76,31 @@ std::vector<std::string> measures_of(const std::string& task) {
   return {"accuracy", "time"};
 }
 
+/// Whether the space has settings of a group of participants.
+bool varies_a_group(const SweepPlan& plan) {
+  const nlohmann::json space = json_or_discarded(plan.space);
+  if (!space.is_object() || !space.contains("parameters")) return false;
+  return std::ranges::any_of(space["parameters"], [](const nlohmann::json& one) {
+    return one.is_object() && one.value("of", "").starts_with("group:");
+  });
+}
+
+std::vector<std::string> columns_of(const StoredBlock& block, const CellName& stimulus,
+                                    const std::string& renderer, const std::string& group,
+                                    const std::vector<std::string>& measures) {
+  std::string place = "_" + block.name;
+  if (!stimulus.base.empty()) place += "_" + stimulus.base;
+  for (const auto& [factor, level] : stimulus.levels) place += "_" + level;
+  place += "_" + renderer;
+  if (!group.empty()) place += "_" + group;
+  std::vector<std::string> out;
+  for (const std::string& measure : measures) {
+    out.push_back(measure + place);
+    out.push_back(measure + "_se" + place);
+  }
+  return out;
+}
+
 }  // namespace
 
 std::vector<std::string> differences(const SweepPlan& a, const SweepPlan& b) {
@@ -105,21 +131,24 @@ std::vector<std::string> differences(const SweepPlan& a, const SweepPlan& b) {
 
 std::vector<TaskCellColumns> task_columns(const SweepPlan& plan) {
   std::vector<TaskCellColumns> cells;
-  const auto add = [&](TaskCellColumns cell) {
-    const std::string place =
-        "_" + cell.block + (cell.stimulus.empty() ? "" : "_" + cell.stimulus) + "_" + cell.renderer;
-    for (const std::string& measure : cell.measures) {
-      cell.columns.push_back(measure + place);
-      cell.columns.push_back(measure + "_se" + place);
-    }
-    cells.push_back(std::move(cell));
-  };
-  for (const StoredBlock& block : read_stored_protocol(plan.protocol).blocks) {
-    if (block.practice) continue;
-    for (const std::string& renderer : block.renderers) {
-      for (const std::string& stimulus : block.stimuli)
-        add({block.task, block.name, stimulus, renderer, measures_of(block.task), {}});
-      if (block.task == "identify") add({block.task, block.name, "", renderer, {"bits"}, {}});
+  const StoredProtocol protocol = read_stored_protocol(plan.protocol);
+  std::vector<std::string> groups{""};
+  if (varies_a_group(plan))
+    groups.insert(groups.end(), protocol.groups.names.begin(), protocol.groups.names.end());
+  for (const std::string& group : groups) {
+    for (const StoredBlock& block : protocol.blocks) {
+      if (block.practice) continue;
+      for (const std::string& renderer : block.renderers) {
+        const auto add = [&](const CellName& stimulus, const std::vector<std::string>& measures) {
+          cells.push_back({block.task, block.name, stimulus.text(), renderer, group, measures,
+                           columns_of(block, stimulus, renderer, group, measures)});
+        };
+        for (const std::string& stimulus : block.stimuli) {
+          if (block.cells.empty()) add({stimulus}, measures_of(block.task));
+          for (const auto& levels : block.cells) add({stimulus, levels}, measures_of(block.task));
+        }
+        if (block.task == "identify") add({}, {"bits"});
+      }
     }
   }
   return cells;

@@ -51,14 +51,17 @@ struct SweepRow {
 /// with levels on both sides of the standard: PSE) and threshold_se_B_S_R, compare jnd_..., detect
 /// d_prime_..., rate exponent_..., adjust pse_... and jnd_..., reach deviation_... and
 /// adaptation_..., identify accuracy_... and time_... (s) likewise, and bits_B_R. Participants
-/// without the figure are left out.
+/// without the figure are left out. In a cell of crossed factors the levels follow the stimulus:
+/// threshold_B_S_rough_large_R. Where the settings of a group vary, the same follows for each group
+/// G by itself: threshold_B_S_R_G, threshold_se_B_S_R_G.
 std::vector<std::string> figure_columns(const SweepPlan& plan);
 
 /// The measures of a cell of a protocol of version 2, and the names of their columns.
 struct TaskCellColumns {
-  std::string task, block, stimulus, renderer;  ///< stimulus "": identify, all together
-  std::vector<std::string> measures;            ///< "threshold", ..., each with a standard error
-  std::vector<std::string> columns;             ///< measures and their errors, alternating
+  /// stimulus: as trials are stored; "": identify, all together. group "": all participants
+  std::string task, block, stimulus, renderer, group;
+  std::vector<std::string> measures;  ///< "threshold", ..., each with a standard error
+  std::vector<std::string> columns;   ///< measures and their errors, alternating
 };
 /// Empty: version 1.
 std::vector<TaskCellColumns> task_columns(const SweepPlan& plan);

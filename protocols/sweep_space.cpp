@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <numbers>
 #include <set>
+#include <string_view>
 
 #include "protocols/json_document.h"
 
@@ -156,6 +157,21 @@ void check_normal(ObjectReader& reader, const SweepParameter& p) {
                           (p.low > p.mean ? "above" : "below") + " it");
 }
 
+/// "participant", "group:NAME" or "protocol".
+void read_target(ObjectReader& reader, SweepParameter& out) {
+  constexpr std::string_view kGroup = "group:";
+  const json* const of = reader.member("of", Presence::required);
+  if (of == nullptr) return;
+  const std::string text = of->is_string() ? of->get<std::string>() : "";
+  if (text == "protocol") out.of = SweptDocument::protocol;
+  if (text.starts_with(kGroup)) out.group = text.substr(kGroup.size());
+  if (text != "protocol" && text != "participant" && out.group.empty())
+    reader.faults().add(reader.pointer("of"),
+                        "expected 'participant', 'group:NAME' (participants of a group) or "
+                        "'protocol'" +
+                            found_text(*of));
+}
+
 SweepParameter read_parameter(ObjectReader& reader) {
   SweepParameter out;
   if (const json* const name = reader.member("name", Presence::required)) {
@@ -166,10 +182,7 @@ SweepParameter read_parameter(ObjectReader& reader) {
                               " letters, digits, '_' and '-'" + found_text(*name));
     }
   }
-  reader.choice(
-      "of", out.of,
-      {{"participant", SweptDocument::participant}, {"protocol", SweptDocument::protocol}},
-      Presence::required);
+  read_target(reader, out);
   read_paths(reader, out);
   reader.choice("distribution", out.distribution,
                 {{to_string(DistributionKind::uniform), DistributionKind::uniform},
@@ -207,7 +220,7 @@ void check_together(const SweepSpace& space, FaultList& faults) {
     }
     for (std::size_t j = 0; j < i; ++j) {
       const SweepParameter& other = space.parameters[j];
-      if (other.of != one.of) continue;
+      if (other.of != one.of || other.group != one.group) continue;
       for (const std::string& a : one.paths) {
         for (const std::string& b : other.paths) {
           if (!overlap(a, b)) continue;

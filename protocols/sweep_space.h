@@ -15,6 +15,7 @@ const char* to_string(DistributionKind kind);  ///< as in the file
 struct SweepParameter {
   std::string name;  ///< unique; letters, digits, '_' and '-'
   SweptDocument of = SweptDocument::participant;
+  std::string group;               ///< participant: of this group alone; "": of all
   std::vector<std::string> paths;  ///< JSON pointers; all get the same value
   DistributionKind distribution = DistributionKind::uniform;
   double low = 0, high = 1;            ///< limits; normal: truncated there, not clipped

@@ -14,6 +14,7 @@
 #include "data/base/random.h"
 #include "data/base/sobol.h"
 #include "data/base/text.h"
+#include "data/stored_protocol.h"
 #include "protocols/json_document.h"
 #include "runner/participants/simulated_settings.h"
 
@@ -249,6 +250,12 @@ std::string place_of(std::size_t parameter, const SweepParameter& one, std::size
   return one.paths.size() == 1 ? place : child_pointer(place, path);
 }
 
+std::string joined_names(const std::vector<std::string>& names) {
+  std::string out;
+  for (const std::string& name : names) out += (out.empty() ? "" : ", ") + name;
+  return out;
+}
+
 std::string near_text(const json& document, const std::string& pointer) {
   std::string out;
   for (const std::string& place : near_pointers(document, pointer))
@@ -325,13 +332,25 @@ SweptStudy::SweptStudy(json protocol, std::string protocol_path, json settings,
 
 void SweptStudy::check_participant(const SweepParameter& one, std::size_t number,
                                    protocols::FaultList& faults) const {
+  json settings = settings_;
+  if (!one.group.empty()) {
+    const GroupAssignment groups = data::read_stored_protocol(protocol_.dump()).groups;
+    if (groups.find(one.group) == groups.names.size())
+      faults.add(child_pointer(child_pointer("/parameters", number), "of"),
+                 groups.any() ? "expected a group of the protocol: " + joined_names(groups.names) +
+                                    "; found '" + one.group + "'"
+                              : "expected 'participant' or 'protocol': the protocol has no groups");
+    if (const json* const own = value_at(settings_, "/groups/" + one.group))
+      settings.merge_patch(json(*own));
+    settings.erase("groups");
+  }
   for (std::size_t p = 0; p < one.paths.size(); ++p) {
     const std::string& path = one.paths[p];
     const std::string place = place_of(number, one, p);
-    const json* const now = value_at(settings_, path);
+    const json* const now = value_at(settings, path);
     if (now == nullptr || now->is_structured() || path == "/version" || path == "/note") {
       faults.add(place, "expected a pointer to a setting of the simulated participant, found " +
-                            path + near_text(settings_, path));
+                            path + near_text(settings, path));
       continue;
     }
     const std::vector<json> values = typical_values(one);
@@ -399,7 +418,8 @@ PointStudy SweptStudy::at(std::uint64_t sweep_seed, std::int64_t point,
   for (std::size_t i = 0; i < space_.parameters.size(); ++i) {
     const SweepParameter& one = space_.parameters[i];
     json& document = one.of == SweptDocument::participant ? out.settings : out.protocol;
-    for (const std::string& path : one.paths) set_value(document, path, values.at(i));
+    const std::string within = one.group.empty() ? "" : "/groups/" + one.group;
+    for (const std::string& path : one.paths) set_value(document, within + path, values.at(i));
   }
   return out;
 }

@@ -73,6 +73,41 @@ TEST(SweepColumns, IdentificationHasInformationOverAllStimuli) {
   EXPECT_EQ(cells[2].stimulus, "");
 }
 
+TEST(SweepColumns, CellsOfFactorsAreApart) {
+  SweepPlan plan = plan_of("");
+  const auto columns_with = [&](const std::string& crossing) {
+    plan.protocol = R"({"version": 2, "renderers": ["ray"], "factors": [
+      {"name": "surface", "levels": [{"name": "smooth", "set": {}}, {"name": "rough", "set": {}}]},
+      {"name": "size", "levels": [{"name": "s", "set": {}}, {"name": "l", "set": {}}]}],
+      "blocks": [{"name": "b", "task": "rate", "stimuli": ["ball"], )" +
+                    crossing + "}]}";
+    return figure_columns(plan);
+  };
+  EXPECT_EQ(columns_with(R"("factors": ["size", "surface"])"),
+            (Names{"exponent_b_ball_smooth_s_ray", "exponent_se_b_ball_smooth_s_ray",
+                   "exponent_b_ball_smooth_l_ray", "exponent_se_b_ball_smooth_l_ray",
+                   "exponent_b_ball_rough_s_ray", "exponent_se_b_ball_rough_s_ray",
+                   "exponent_b_ball_rough_l_ray", "exponent_se_b_ball_rough_l_ray"}));
+  EXPECT_EQ(task_columns(plan).front().stimulus, "ball[surface=smooth,size=s]");
+  EXPECT_EQ(columns_with(R"("factors": {"surface": ["rough"]})"),
+            (Names{"exponent_b_ball_rough_ray", "exponent_se_b_ball_rough_ray"}));
+  EXPECT_EQ(columns_with(R"("factors": ["size", "surface"], "shared": true)"),
+            (Names{"exponent_b_ball_ray", "exponent_se_b_ball_ray"}));
+}
+
+TEST(SweepColumns, GroupsFollowWhereTheirSettingsVary) {
+  SweepPlan plan = plan_of("");
+  plan.protocol = R"({"version": 2, "renderers": ["ray"], "groups": {"names": ["young", "old"]},
+      "blocks": [{"name": "b", "task": "rate", "stimuli": ["ball"]}]})";
+  plan.space = R"({"parameters": [{"name": "delay", "of": "participant"}]})";
+  EXPECT_EQ(figure_columns(plan), (Names{"exponent_b_ball_ray", "exponent_se_b_ball_ray"}));
+  plan.space = R"({"parameters": [{"name": "delay", "of": "group:old"}]})";
+  EXPECT_EQ(figure_columns(plan),
+            (Names{"exponent_b_ball_ray", "exponent_se_b_ball_ray", "exponent_b_ball_ray_young",
+                   "exponent_se_b_ball_ray_young", "exponent_b_ball_ray_old",
+                   "exponent_se_b_ball_ray_old"}));
+}
+
 TEST(SweepColumns, Version1HasTimesByShapeAndRenderer) {
   SweepPlan plan = plan_of("");
   plan.protocol = R"({"version": 1})";

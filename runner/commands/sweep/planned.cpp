@@ -14,6 +14,7 @@
 #include "analysis/statistics/describe.h"
 #include "analysis/statistics/paired.h"
 #include "analysis/statistics/task_analysis.h"
+#include "data/base/cell_name.h"
 #include "data/base/checksum.h"
 #include "data/base/json_text.h"
 #include "data/base/text.h"
@@ -244,24 +245,44 @@ std::vector<double> identified(const analysis::StudyTable& table, const data::Ta
   return values;
 }
 
+/// The trials of a group, or of all: "". Those of a track that cells share are of its plain
+/// stimulus.
+analysis::StudyTable trials_of_group(const analysis::StudyTable& all, const std::string& group,
+                                     const std::vector<data::TaskCellColumns>& columns) {
+  analysis::StudyTable out;
+  for (const analysis::StudyTrial& trial : all.trials) {
+    if (!group.empty() && trial.group != group) continue;
+    out.trials.push_back(trial);
+    const bool of_cell = std::ranges::any_of(columns, [&](const data::TaskCellColumns& one) {
+      return one.block == trial.block_name && one.stimulus == trial.shape;
+    });
+    if (!of_cell) out.trials.back().shape = base_name(trial.shape);
+  }
+  return out;
+}
+
 /// The figures of a protocol of version 2, in the order of figure_columns().
 std::vector<std::optional<double>> task_figures_of(const data::SweepPlan& plan,
-                                                   analysis::StudyTable table) {
+                                                   const analysis::StudyTable& table) {
   analysis::FunctionSettings without_p;
   without_p.simulations = 0;
-  const analysis::StudyAnalysis found = analysis::analyze_study(std::move(table), without_p);
+  const std::vector<data::TaskCellColumns> columns = data::task_columns(plan);
   std::vector<std::optional<double>> out;
-  for (const data::TaskCellColumns& wanted : data::task_columns(plan)) {
-    const auto cell =
-        std::find_if(found.cells.begin(), found.cells.end(), [&](const analysis::TaskCell& one) {
-          return one.block_name == wanted.block && one.renderer == wanted.renderer &&
-                 one.shape == (wanted.task == "identify" ? "" : wanted.stimulus);
-        });
+  std::optional<analysis::StudyAnalysis> found;
+  const std::string* group = nullptr;  // that was analysed last: groups follow each other
+  for (const data::TaskCellColumns& wanted : columns) {
+    if (group == nullptr || *group != wanted.group)
+      found = analysis::analyze_study(trials_of_group(table, wanted.group, columns), without_p);
+    group = &wanted.group;
+    const auto cell = std::ranges::find_if(found->cells, [&](const analysis::TaskCell& one) {
+      return one.block_name == wanted.block && one.renderer == wanted.renderer &&
+             one.shape == (wanted.task == "identify" ? "" : wanted.stimulus);
+    });
     for (const std::string& measure : wanted.measures) {
       std::vector<double> values;
       if (measure == "accuracy" || measure == "time") {
-        values = identified(found.table, wanted, measure == "time");
-      } else if (cell != found.cells.end()) {
+        values = identified(found->table, wanted, measure == "time");
+      } else if (cell != found->cells.end()) {
         values = figures_of_participants(*cell, measure);
       }
       out.push_back(mean_of(values));
@@ -373,12 +394,13 @@ std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
         protocol, settings, sweep.plan.participants, study.seed, stop,
         [&](int participant, const data::TrialRecord& record, std::uint64_t contact_ticks) {
           if (!has_blocks) return trials.add(participant, record, contact_ticks);
-          if (!record.practice)
-            tasks.trials.push_back(
-                analysis::study_trial_of(session::simulated_code(participant), record));
+          if (record.practice) return;
+          tasks.trials.push_back(
+              analysis::study_trial_of(session::simulated_code(participant), record));
+          tasks.trials.back().group = protocol.groups.name(participant);
         });
     if (!done) return std::nullopt;
-    row.figures = has_blocks ? task_figures_of(sweep.plan, std::move(tasks)) : trials.figures();
+    row.figures = has_blocks ? task_figures_of(sweep.plan, tasks) : trials.figures();
   } catch (const std::exception& error) {
     row.reason = reason_of(error);
     row.figures.assign(data::figure_columns(sweep.plan).size(), std::nullopt);

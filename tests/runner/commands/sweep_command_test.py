@@ -1,5 +1,6 @@
 """palpate sweep, merge and export of sweeps, from outside. Usage: sweep_command_test.py PALPATE PROTOCOLS"""
 
+import csv
 import json
 import math
 import os
@@ -177,6 +178,40 @@ class Sweeps(SweepCase):
         for line, word in zip(lines, ("must be above 0", "must be 0 to 10", "whole number, 2 to 64", "expected an integer",
                                       "tip or surface")):
             self.assertIn(word, line)
+
+    def test_groups_vary_and_have_figures_of_their_own(self):
+        self.write("p.json", {
+            "version": 2, "name": "groups", "renderers": ["ray"], "seed": 5, "groups": {"names": ["young", "old"]},
+            "factors": [{"name": "size", "levels": [{"name": "small", "set": {"/stimuli/*/radius_m": 0.02}}, {"name": "large", "set": {}}]}],
+            "stimuli": PROTOCOL["stimuli"],
+            "blocks": [{"name": "which", "task": "identify", "stimuli": ["ball", "hat"], "factors": ["size"], "repetitions": 2}]})
+        self.write("s.json", {"version": 1, "parameters": [
+            {"name": "delay", "of": "group:old", "path": "/motor/reaction_delay_s", "distribution": "uniform", "low": 0.2, "high": 0.6}]})
+        arguments = ["sweep", "p.json", "--space", "s.json", "--points", 2, "--participants", 2, "--db", "a.sweep"]
+        self.palpate(*arguments)
+        for row in self.rows("a.sweep"):
+            self.assertEqual((row["status"], row["reason"]), ("ok", ""))
+            for shape in ("ball", "hat"):
+                for size in ("small", "large"):
+                    of_all, young, old = (float(row[f"accuracy_which_{shape}_{size}_ray{group}"]) for group in ("", "_young", "_old"))
+                    self.assertAlmostEqual(of_all, (young + old) / 2)
+        # The point run again by simulate: participant 2 is the old one.
+        point = json.loads(self.palpate(*arguments, "--print-point", 2))
+        self.assertEqual(point["settings"]["groups"], {"old": {"motor": {"reaction_delay_s": float(row["delay"])}}})
+        self.write("point.json", point["protocol"])
+        self.write("patch.json", {"groups": point["settings"]["groups"]})
+        self.palpate("simulate", "point.json", "--db", "study.db", "--participants", 2, "--seed", point["seed"], "--settings", "patch.json")
+        self.palpate("export", "--db", "study.db", "--format", "csv", "--out", "study.csv")
+        with open(self.folder / "study.csv", newline="") as text:
+            trials = [one for one in csv.DictReader(text) if one["group"] == "old" and one["size"] == "small" and one["shape"] == "hat"]
+        self.assertEqual(len(trials), 2)
+        self.assertAlmostEqual(sum(int(one["correct"]) for one in trials) / 2, float(row["accuracy_which_hat_small_ray_old"]))
+        self.write("s.json", {"version": 1, "parameters": [
+            {"name": name, "of": of, "path": "/motor/reaction_delay_s", "distribution": "uniform", "low": 0.2, "high": 0.6}
+            for name, of in (("a", "group:young"), ("b", "group:older"))]})
+        said = self.palpate(*arguments[:-1], "b.sweep", status=2)
+        self.assertEqual([line.split(": ")[1] for line in said.strip().splitlines()], ["/parameters/1/of"], said)
+        self.assertIn("young, old; found 'older'", said)
 
     def test_integers_beyond_a_doubles_precision_are_refused(self):
         line, = self.refused_space({"of": "protocol", "path": "/seed", "distribution": "choice",
