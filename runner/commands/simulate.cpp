@@ -88,31 +88,6 @@ std::optional<SimulateSettings> parse_simulate_settings(const std::vector<std::s
   return settings;
 }
 
-/// The numbers that participants of groups get as they come: "young=12,old=10".
-/// \throws UsageError
-std::vector<int> numbers_of_groups(const std::string& text, const GroupAssignment& groups) {
-  if (groups.rule != GroupAssignment::Rule::given || !groups.any())
-    throw UsageError(
-        "--groups: the protocol assigns groups itself, or has none; use --participants");
-  const std::string expected = "--groups: expected NAME=N,... of " + join_names(groups.names);
-  std::set<int> numbers;
-  std::istringstream parts(text);
-  for (std::string part; std::getline(parts, part, ',');) {
-    const std::size_t equals = part.find('=');
-    const std::size_t group = groups.find(part.substr(0, equals));
-    const std::string digits = equals == std::string::npos ? "" : part.substr(equals + 1);
-    const bool is_count = !digits.empty() && digits.size() < 6 &&
-                          digits.find_first_not_of("0123456789") == std::string::npos;
-    if (group == groups.names.size() || !is_count)
-      throw UsageError(expected + ", found '" + part + "'");
-    if (numbers.contains(groups.number(group, 1)))
-      throw UsageError(expected + " once each, found '" + part + "'");
-    for (int row = 1; row <= std::stoi(digits); ++row) numbers.insert(groups.number(group, row));
-  }
-  if (numbers.empty()) throw UsageError(expected + " with at least one participant");
-  return {numbers.begin(), numbers.end()};
-}
-
 /// \throws UsageError: no such shard
 session::StudyPlan plan_of(const SimulateSettings& settings, const GroupAssignment& groups) {
   const Shard shard =

@@ -133,22 +133,22 @@ py::tuple simulate(const Document& given, const std::string& settings_text, int 
     limited = study::fit_to_simulation(protocol, settings).texts;
     Interruption interruption;
     const std::atomic<bool> stop{false};  // an exception ends it
-    session::simulate_in_memory(protocol, settings, participants, seed, stop,
-                                [&](int number, const data::TrialRecord& record, std::uint64_t) {
-                                  data::StoredTrial trial;
-                                  trial.participant.code = session::simulated_code(number);
-                                  trial.participant.number = number;
-                                  trial.participant.enrolled_number = number;
-                                  trial.participant.simulated = true;
-                                  trial.participant.seed = seed;
-                                  trial.protocol_name = protocol.name;
-                                  trial.protocol_sha256 = protocol.sha256;
-                                  trial.run = session::simulated_run(protocol, settings, number,
-                                                                     record.session);
-                                  trial.record = record;
-                                  trials.add(trial);
-                                  interruption.check();
-                                });
+    session::simulate_in_memory(
+        protocol, settings, session::first_numbers(participants), seed, stop,
+        [&](int number, const data::TrialRecord& record, std::uint64_t) {
+          data::StoredTrial trial;
+          trial.participant.code = session::simulated_code(number);
+          trial.participant.number = number;
+          trial.participant.enrolled_number = number;
+          trial.participant.simulated = true;
+          trial.participant.seed = seed;
+          trial.protocol_name = protocol.name;
+          trial.protocol_sha256 = protocol.sha256;
+          trial.run = session::simulated_run(protocol, settings, number, record.session);
+          trial.record = record;
+          trials.add(trial);
+          interruption.check();
+        });
   }
   return py::make_tuple(arrays_of(trials.table()), limited);
 }

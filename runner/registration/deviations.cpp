@@ -248,14 +248,14 @@ CheckPoint of_order(const Registration& registered, const StudyData& study) {
       out.evidence.push_back(who + ": there is no such number");
       continue;
     }
-    const auto at = static_cast<std::size_t>(number) - 1;
-    if (at >= registered.order_sha256.size()) {
+    const auto own = registered.order_sha256.find(number);
+    if (own == registered.order_sha256.end()) {
       ++beyond;
     } else if (const std::string sha256 = study::order_checksum(registered.protocol, number);
-               sha256 != registered.order_sha256[at]) {
-      out.evidence.push_back(
-          who + ": the registered order has SHA-256 " + short_sum(registered.order_sha256[at]) +
-          "; this program makes another one of the registered protocol, " + short_sum(sha256));
+               sha256 != own->second) {
+      out.evidence.push_back(who + ": the registered order has SHA-256 " + short_sum(own->second) +
+                             "; this program makes another one of the registered protocol, " +
+                             short_sum(sha256));
       continue;
     }
     const std::string differs =
@@ -275,27 +275,45 @@ CheckPoint of_order(const Registration& registered, const StudyData& study) {
   return out;
 }
 
-/// How many participants there should be when a study has n: at a planned look, those of the look.
-std::size_t planned_so_far(const Registration& registered, std::size_t n) {
+/// The numbers that participants should have when a study has n: at a planned look, those of the
+/// look.
+std::vector<int> planned_so_far(const Registration& registered, std::size_t n) {
   const bool is_look = std::ranges::find(registered.looks, n, &analysis::Look::participants) !=
                        registered.looks.end();
-  return is_look ? n : registered.participants;
+  std::vector<int> numbers;
+  for (const auto& [number, sha256] : registered.order_sha256) {
+    if (is_look && numbers.size() == n) break;
+    numbers.push_back(number);
+  }
+  return numbers;
+}
+
+/// "1 to 12", or of groups of other sizes "1 to 20, 22, 24".
+std::string numbers_in_words(const std::vector<int>& numbers) {
+  std::string out;
+  for (std::size_t i = 0, end = 0; i < numbers.size(); i = end) {
+    for (end = i + 1; end < numbers.size() && numbers[end] == numbers[end - 1] + 1;) ++end;
+    out += (out.empty() ? "" : ", ") + std::to_string(numbers[i]) +
+           (end > i + 1 ? " to " + std::to_string(numbers[end - 1]) : "");
+  }
+  return out;
 }
 
 /// "point, then ray" -> number of participants.
 using OrderCounts = std::map<std::string, std::size_t>;
 
-/// Of the first participants. Empty where the order is not counterbalanced.
-OrderCounts registered_orders(const Registration& registered, std::size_t participants) {
+/// Of participants of these numbers. Empty where the order is not counterbalanced.
+OrderCounts registered_orders(const Registration& registered, const std::vector<int>& numbers) {
   OrderCounts out;
   const protocols::Protocol& protocol = registered.protocol;
-  const auto orders = static_cast<std::size_t>(protocols::block_orders(protocol));
+  const int orders = protocols::block_orders(protocol);
   if (orders < 2) return out;
-  // With groups in permuted blocks nothing repeats.
-  const std::size_t repeat = protocol.groups.any() ? participants : orders;
-  for (std::size_t i = 0; i < std::min(repeat, participants); ++i)
-    out[study::condition_order(protocol, static_cast<int>(i) + 1)] +=
-        (participants - i + repeat - 1) / repeat;
+  std::map<int, std::string> known;  // with groups in permuted blocks nothing repeats
+  for (const int number : numbers) {
+    std::string& order = known[protocol.groups.any() ? number : (number - 1) % orders];
+    if (order.empty()) order = study::condition_order(protocol, number);
+    ++out[order];
+  }
   return out;
 }
 
@@ -355,16 +373,17 @@ CheckPoint of_looks(const Registration& registered, const StudyData& study) {
 /// Whose data are there, by number. A sample that is selected afterwards shows in the numbers,
 /// which are given in the order of arrival, or in the removals.
 CheckPoint of_participants(const Registration& registered, const StudyData& study) {
-  const std::size_t n = study.participants.size(), planned = planned_so_far(registered, n);
+  const std::size_t n = study.participants.size();
+  const std::vector<int> planned = planned_so_far(registered, n);
   CheckPoint out{"participants", "Participants", Finding::as_registered,
-                 counted(n, "participant", "participants") + " with the numbers 1 to " +
-                     std::to_string(planned) + ", as registered; nobody was removed."};
+                 counted(n, "participant", "participants") + " with the numbers " +
+                     numbers_in_words(planned) + ", as registered; nobody was removed."};
   std::map<int, std::set<std::string>> by_number, without_trials;
   for (const StudyParticipant& one : study.participants)
     by_number[one.person.enrolled_number].insert(one.person.code);
   for (const data::Participant& one : people_without_trials(study))
     without_trials[one.enrolled_number].insert(one.code);
-  for (int number = 1; static_cast<std::size_t>(number) <= planned; ++number) {
+  for (const int number : planned) {
     if (by_number.contains(number)) continue;
     const auto began = without_trials.find(number);
     out.evidence.push_back("no participant has number " + std::to_string(number) +
@@ -373,9 +392,9 @@ CheckPoint of_participants(const Registration& registered, const StudyData& stud
                                 : ": " + names(began->second) + " began and completed no trial"));
   }
   for (const auto& [number, codes] : by_number) {
-    if (number < 1 || static_cast<std::size_t>(number) > planned)
+    if (!std::ranges::binary_search(planned, number))
       out.evidence.push_back(names(codes) + (codes.size() == 1 ? " has" : " have") + " number " +
-                             std::to_string(number) + ", " + std::to_string(planned) +
+                             std::to_string(number) + ", " + std::to_string(planned.size()) +
                              " registered");
     if (codes.size() > 1)
       out.evidence.push_back(names(codes) + " have the same number " + std::to_string(number));
@@ -385,10 +404,11 @@ CheckPoint of_participants(const Registration& registered, const StudyData& stud
                            " removed from the database with 'palpate forget'; it does not keep "
                            "their numbers, trials or protocol");
   const std::string orders = orders_text(registered, study);
-  if (!out.evidence.empty() || n != planned) {
+  if (!out.evidence.empty() || n != planned.size()) {
     out.finding = Finding::deviation;
     out.sentence =
-        counted(n, "participant", "participants") + ", " + std::to_string(planned) + " registered" +
+        counted(n, "participant", "participants") + ", " + std::to_string(planned.size()) +
+        " registered" +
         (study.removed > 0 ? "; " + std::to_string(study.removed) + " more removed" : "") +
         ". Who is in the study is not as registered.";
     cut(out.evidence);

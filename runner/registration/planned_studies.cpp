@@ -447,7 +447,7 @@ void PlannedTasks::simulate(std::size_t study, bool with_effect, const Visit& vi
   protocols::Trial shown;
   const participants::JudgementOf judged = judgement(study, with_effect);
   session::simulate_in_memory(
-      protocol_, settings_, static_cast<int>(made_.participants), made_.seed + study, {},
+      protocol_, settings_, planned_numbers(made_), made_.seed + study, {},
       [&](int participant, const data::TrialRecord& record, std::uint64_t) {
         if (!record.task.reach) return visit(participant, record);
         data::TrialRecord planned = record;
@@ -493,7 +493,7 @@ void PlannedTasks::write(const std::string& folder, const std::string& csv,
     write_movements(store, with_effect);
   } else {
     session::StudyPlan plan;
-    plan.numbers = session::first_numbers(static_cast<int>(made_.participants));
+    plan.numbers = planned_numbers(made_);
     plan.seed = made_.seed;
     plan.planned = judgement(0, with_effect);
     session::simulate_study(protocol_, store, settings_, plan, {}, {});

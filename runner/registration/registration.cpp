@@ -147,9 +147,9 @@ void read_study(ObjectReader& reader, Registration& out, Stated& stated) {
       Presence::required);
   read_objects(reader, "orders", out.participants, out.participants, [&](ObjectReader& order) {
     std::size_t number = 0;
-    const auto expected = static_cast<double>(out.order_sha256.size() + 1);
-    order.count("participant_number", number, {expected, expected});
-    order.checksum("sha256", out.order_sha256.emplace_back());
+    const int last = out.order_sha256.empty() ? 0 : out.order_sha256.rbegin()->first;
+    order.count("participant_number", number, {last + 1.0, kHighestNumber});
+    order.checksum("sha256", out.order_sha256[static_cast<int>(number)]);
   });
 }
 
@@ -247,6 +247,12 @@ std::vector<std::string> contradictions_of(const Registration& read, const State
       out.push_back("registration.json states another alpha of the look at " +
                     std::to_string(read.looks[k].participants) +
                     " participants than its spending gives");
+  const int last = read.order_sha256.rbegin()->first;
+  if (read.protocol.groups.rule != GroupAssignment::Rule::given &&
+      static_cast<std::size_t>(last) != read.participants)
+    out.push_back("registration.json has the order of number " + std::to_string(last) + ", of " +
+                  std::to_string(read.participants) +
+                  " participants, whose numbers the protocol gives in turn");
   std::vector<std::string> ids;
   for (const analysis::Hypothesis& one : read.hypotheses) ids.push_back(one.id);
   if (ids != stated.hypothesis_ids)
@@ -270,6 +276,12 @@ std::optional<analysis::Spending> spending_of(const std::string& name) {
   for (const auto one : {analysis::Spending::obrien_fleming, analysis::Spending::pocock})
     if (name == to_string(one)) return one;
   return std::nullopt;
+}
+
+std::vector<int> planned_numbers(const Registration& registration) {
+  std::vector<int> numbers;
+  for (const auto& [number, sha256] : registration.order_sha256) numbers.push_back(number);
+  return numbers;
 }
 
 double alpha_at(const Registration& registration, std::size_t participants) {
@@ -306,9 +318,8 @@ std::string registration_json(const Registration& registration) {
         {{"participants", look.participants}, {"alpha", look.alpha}});
   if (!registration.looks.empty()) out["analysis"]["spending"] = to_string(registration.spending);
   out["orders"] = Json::array();
-  for (std::size_t i = 0; i < registration.order_sha256.size(); ++i)
-    out["orders"].push_back(
-        {{"participant_number", i + 1}, {"sha256", registration.order_sha256[i]}});
+  for (const auto& [number, sha256] : registration.order_sha256)
+    out["orders"].push_back({{"participant_number", number}, {"sha256", sha256}});
   out["simulated_participant"] = {{"version", registration.participant_version},
                                   {"settings_sha256", registration.participant_sha256}};
   out["simulated_studies"] = {

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <vector>
@@ -45,11 +46,13 @@ struct Registration {
   double too_fast = 0.2, alpha = 0.05;  ///< s; of the tests, all looks together
   std::vector<analysis::Look> looks;    ///< before the end and at it; none: at the end alone
   analysis::Spending spending = analysis::Spending::obrien_fleming;  ///< of alpha over the looks
-  std::vector<std::string> order_sha256;  ///< of participant number 1, 2, ...
-  int participant_version = 0;            ///< default of the simulated participant
-  std::string participant_sha256;         ///< its settings
-  std::vector<Rehearsal> rehearsals;      ///< one for each hypothesis
-  std::uint64_t seed = 1;                 ///< of the simulated studies
+  /// By the number of the participant. 1, 2, ...; of groups that the experimenter names, as many of
+  /// each as are planned.
+  std::map<int, std::string> order_sha256;
+  int participant_version = 0;        ///< default of the simulated participant
+  std::string participant_sha256;     ///< its settings
+  std::vector<Rehearsal> rehearsals;  ///< one for each hypothesis
+  std::uint64_t seed = 1;             ///< of the simulated studies
   /// s, of the simulated studies; 0: nothing is identified.
   double typical_time = 0;
   std::optional<std::size_t> sessions_so_far;  ///< in the named database; none: no database
@@ -65,12 +68,17 @@ const char* to_string(analysis::Spending spending);
 /// nullopt: none of the names
 std::optional<analysis::Spending> spending_of(const std::string& name);
 
+/// Of the participants, ascending.
+std::vector<int> planned_numbers(const Registration& registration);
+
 /// What "alpha" is in a hypothesis when a study has so many participants: that of the look, if
 /// looks are planned; NaN: none is planned then.
 double alpha_at(const Registration& registration, std::size_t participants);
 
 /// The fewest and most participants of a registration.
 inline constexpr std::size_t kFewestParticipants = 2, kMostParticipants = 10'000;
+/// Of a participant: of one group alone, of as many as there may be.
+inline constexpr int kHighestNumber = 10'000 * static_cast<int>(GroupAssignment::kMost);
 /// The most looks at a study, its end among them.
 inline constexpr std::size_t kMostLooks = 20;
 /// s, largest limit of too fast answers.

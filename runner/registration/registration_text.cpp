@@ -188,9 +188,9 @@ class Questions {
   Question randomisation() const {
     Question question{"q7", "Randomization", study_->randomisation()};
     std::string rows;
-    for (std::size_t i = 0; i < made_.order_sha256.size(); ++i)
-      rows += (i > 0 ? "\n" : "") + analysis::pad_left(std::to_string(i + 1), 4) + "  " +
-              made_.order_sha256[i];
+    for (const auto& [number, sha256] : made_.order_sha256)
+      rows += (rows.empty() ? "" : "\n") + analysis::pad_left(std::to_string(number), 4) + "  " +
+              sha256;
     question.answer.push_back(lines(rows));
     return question;
   }

@@ -223,8 +223,8 @@ class TaskAnswers final : public StudyAnswers {
     const bool about = study::has_adaptive_blocks(protocol_);
     if (protocol_.groups.any()) {
       std::size_t all = 0;
-      for (std::size_t n = 1; n <= people; ++n)
-        all += study::planned_trials(protocols::protocol_of(protocol_, static_cast<int>(n)));
+      for (const auto& [number, sha256] : made_.order_sha256)
+        all += study::planned_trials(protocols::protocol_of(protocol_, number));
       return {text(counted(people, "participant", "participants") + " with " +
                    (about ? "about " : "") + std::to_string(all) +
                    " trials in all that are analysed; each has those of the own group.")};
@@ -604,8 +604,8 @@ class TaskAnswers final : public StudyAnswers {
   /// Who belongs to which group, and how many.
   std::string groups() const {
     std::vector<std::size_t> counts(protocol_.groups.names.size());
-    for (std::size_t n = 1; n <= made_.participants; ++n)
-      ++counts[protocol_.groups.group(static_cast<int>(n))];
+    for (const auto& [number, sha256] : made_.order_sha256)
+      ++counts[protocol_.groups.group(number)];
     std::string out = "Groups of participants: " + study::groups_in_words(protocol_) + ". Planned:";
     for (std::size_t i = 0; i < counts.size(); ++i)
       out += (i == 0 ? " " : ", ") + protocol_.groups.names[i] + " " + std::to_string(counts[i]);

@@ -427,11 +427,11 @@ data::RunInfo simulated_run(const protocols::Protocol& protocol,
 
 bool simulate_in_memory(
     const protocols::Protocol& protocol, const participants::SimulatedSettings& settings,
-    int participants, std::uint64_t seed, const std::atomic<bool>& stop,
+    const std::vector<int>& numbers, std::uint64_t seed, const std::atomic<bool>& stop,
     const std::function<void(int, const data::TrialRecord&, std::uint64_t)>& visit,
     const participants::JudgementOf& planned) {
   const SimulatedGroups groups(protocol, settings, seed, planned);
-  for (int number = 1; number <= participants; ++number) {
+  for (const int number : numbers) {
     const SimulatedStudy& study = groups.study_of(number);
     for (int session = 1; session <= study.protocol.sessions.count; ++session) {
       VisitingLog log([&](const data::TrialRecord& record) {

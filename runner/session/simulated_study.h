@@ -62,12 +62,12 @@ data::RunInfo simulated_run(const protocols::Protocol& protocol,
                             const participants::SimulatedSettings& settings, int participant,
                             int session);
 
-/// Simulates a whole study without storing it: participants from 1, their sessions in order, in
-/// this thread. \param visit  gets the participant's number, a trial and its ticks with contact.
-/// \return false: stopped before its end. \throws as SimulatedStudy
+/// Simulates a whole study without storing it: participants of these numbers, their sessions in
+/// order, in this thread. \param visit  gets the participant's number, a trial and its ticks with
+/// contact. \return false: stopped before its end. \throws as SimulatedStudy
 bool simulate_in_memory(
     const protocols::Protocol& protocol, const participants::SimulatedSettings& settings,
-    int participants, std::uint64_t seed, const std::atomic<bool>& stop,
+    const std::vector<int>& numbers, std::uint64_t seed, const std::atomic<bool>& stop,
     const std::function<void(int, const data::TrialRecord&, std::uint64_t)>& visit,
     const participants::JudgementOf& planned = {});
 

@@ -30,6 +30,7 @@
 #include "protocols/tasks/block_order.h"
 #include "runner/build_info.h"
 #include "runner/commands/shared/command.h"
+#include "runner/commands/shared/study_options.h"
 #include "runner/output/progress_line.h"
 #include "runner/participants/simulated_settings.h"
 #include "runner/registration/answers.h"
@@ -51,6 +52,7 @@ constexpr const char* kMark = "registration.json";
 
 struct RegisterOptions {
   std::string protocol, plan, hypotheses, out, database;
+  std::string groups;  ///< "young=12,old=10"; empty: equal ones
   std::size_t participants = 0, jobs = 1;
   std::optional<std::size_t> studies;
   std::vector<std::size_t> looks;
@@ -116,6 +118,9 @@ hypotheses.json:
   add("out", po::value(&options.out)->required()->value_name("FOLDER"), "a new folder");
   add("participants", po::value(&options.participants)->value_name("N"),
       "planned number; default: that of the plan");
+  add("groups", po::value(&options.groups)->value_name("NAME=N,..."),
+      "planned number of each group, where the protocol leaves the group to the experimenter; "
+      "instead of --participants");
   std::string looks, spending = registration::to_string(options.spending);
   add("looks", po::value(&looks)->value_name("N,N,N"),
       "participants after which the hypotheses are judged, the last of all; alpha is spent over "
@@ -143,6 +148,10 @@ hypotheses.json:
                                         options.participants > registration::kMostParticipants))
     throw UsageError("--participants: must be 2 to " +
                      std::to_string(registration::kMostParticipants));
+  if (!options.groups.empty() && values->count("participants"))
+    throw UsageError("--groups: says how many participants; leave out --participants");
+  if (!options.groups.empty() && !looks.empty())
+    throw UsageError("--looks: go with groups of one size; leave out --groups");
   if (!(options.too_fast > 0 && options.too_fast <= registration::kMostTooFast))
     throw UsageError("--too-fast-s: must be above 0, at most 60 s");
   if (values->count("studies")) options.studies = studies;
@@ -339,7 +348,14 @@ int register_command(const std::vector<std::string>& args) {
   made.plan_text = protocols::read_text_file(options.plan);
   made.plan = read_fitting_plan(options.plan, made.plan_text, made.protocol);
   made.hypotheses_text = protocols::read_text_file(options.hypotheses);
-  made.participants = sample_size(options, made);
+  const std::vector<int> planned =
+      options.groups.empty() ? session::first_numbers(static_cast<int>(sample_size(options, made)))
+                             : numbers_of_groups(options.groups, made.protocol.groups);
+  made.participants = planned.size();
+  if (made.participants < registration::kFewestParticipants ||
+      made.participants > registration::kMostParticipants)
+    throw UsageError("--groups: must be 2 to " + std::to_string(registration::kMostParticipants) +
+                     " participants together");
   if (!options.database.empty())
     made.sessions_so_far = sessions_in(options.database, made.protocol.name);
   require_replaceable(options);
@@ -363,8 +379,8 @@ int register_command(const std::vector<std::string>& args) {
   made.typical_time = registration::typical_time(made.protocol, made.too_fast);
   made.participant_version = participants::kDefaultParticipantVersion;
   made.participant_sha256 = participants::load_simulated_settings("").sha256;
-  for (std::size_t p = 1; p <= made.participants; ++p)
-    made.order_sha256.push_back(study::order_checksum(made.protocol, static_cast<int>(p)));
+  for (const int number : planned)
+    made.order_sha256[number] = study::order_checksum(made.protocol, number);
 
   data::AtomicFolder draft(options.out);
   put_simulated(options, draft, made);

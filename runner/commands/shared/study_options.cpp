@@ -4,6 +4,8 @@
 #include <charconv>
 #include <cstdio>
 #include <optional>
+#include <set>
+#include <sstream>
 #include <string>
 #include <vector>
 
@@ -11,6 +13,7 @@
 #include "runner/commands/shared/command.h"
 #include "runner/session/socket_advisor.h"
 #include "runner/study/simulation_limits.h"
+#include "runner/terminal.h"
 
 namespace palpate::runner::commands {
 
@@ -135,6 +138,29 @@ int version_to_resume_with(const std::set<int>& begun, const std::string& file) 
                  printable(file).c_str(), *begun.begin());
   }
   return *begun.begin();
+}
+
+std::vector<int> numbers_of_groups(const std::string& text, const GroupAssignment& groups) {
+  if (groups.rule != GroupAssignment::Rule::given || !groups.any())
+    throw UsageError(
+        "--groups: the protocol assigns groups itself, or has none; use --participants");
+  const std::string expected = "--groups: expected NAME=N,... of " + join_names(groups.names);
+  std::set<int> numbers;
+  std::istringstream parts(text);
+  for (std::string part; std::getline(parts, part, ',');) {
+    const std::size_t equals = part.find('=');
+    const std::size_t group = groups.find(part.substr(0, equals));
+    const std::string digits = equals == std::string::npos ? "" : part.substr(equals + 1);
+    const bool is_count = !digits.empty() && digits.size() < 6 &&
+                          digits.find_first_not_of("0123456789") == std::string::npos;
+    if (group == groups.names.size() || !is_count)
+      throw UsageError(expected + ", found '" + part + "'");
+    if (numbers.contains(groups.number(group, 1)))
+      throw UsageError(expected + " once each, found '" + part + "'");
+    for (int row = 1; row <= std::stoi(digits); ++row) numbers.insert(groups.number(group, row));
+  }
+  if (numbers.empty()) throw UsageError(expected + " with at least one participant");
+  return {numbers.begin(), numbers.end()};
 }
 
 }  // namespace palpate::runner::commands

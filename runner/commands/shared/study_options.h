@@ -5,7 +5,9 @@
 #include <functional>
 #include <set>
 #include <string>
+#include <vector>
 
+#include "data/base/group_assignment.h"
 #include "runner/commands/shared/command.h"
 #include "runner/participants/simulated_settings.h"
 
@@ -24,6 +26,10 @@ void add_study_options(CommandLine& line, StudyOptions& options);
 /// Call it with the result of CommandLine::parse. \throws UsageError
 void check_study_options(const boost::program_options::variables_map& values,
                          StudyOptions& options);
+
+/// The numbers that participants of groups get as they come, ascending: "young=12,old=10".
+/// \throws UsageError
+std::vector<int> numbers_of_groups(const std::string& text, const GroupAssignment& groups);
 
 /// \throws UsageError: the path is not a socket, or the time is out of range
 void check_advisor(const std::string& path, double time_out);

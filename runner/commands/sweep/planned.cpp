@@ -391,7 +391,7 @@ std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
     TrialCollection trials(sweep.plan);
     analysis::StudyTable tasks;
     const bool done = session::simulate_in_memory(
-        protocol, settings, sweep.plan.participants, study.seed, stop,
+        protocol, settings, session::first_numbers(sweep.plan.participants), study.seed, stop,
         [&](int participant, const data::TrialRecord& record, std::uint64_t contact_ticks) {
           if (!has_blocks) return trials.add(participant, record, contact_ticks);
           if (record.practice) return;

@@ -136,6 +136,43 @@ class Groups(command_case.CommandCase):
         self.assertIn("/groups/old/motor/speed: no such setting",
                       self.palpate("simulate", protocol, "--db", self.dir / "w.db", "--settings", bad, status=2).stderr)
 
+    def test_groups_of_other_sizes_are_registered(self):
+        protocol = self.grouped()
+        self.palpate("plan", "--exponent-effect", 20, "--trials", 3, "--participants", "4-8", "--studies", 100, "--json", self.dir / "plan.json")
+        hypotheses = self.file("h.json", [{"id": "H1", "text": "Older people say more.",
+                                           "corroborated": "effects.exponent.a.group.p < alpha", "refuted": "effects.exponent.a.group.p > 0.5"}])
+        out = self.dir / "registration"
+        register = ["register", protocol, "--plan", self.dir / "plan.json", "--hypotheses", hypotheses, "--studies", 20, "--out"]
+        for wrong, words in ((["--groups", "young=4", "--participants", 4], "leave out --participants"), (["--groups", "young=1"], "2 to 10000"),
+                             (["--groups", "young=4,elder=1"], "elder"), (["--groups", "young=4,old=2", "--looks", "3,6"], "--looks")):
+            self.assertIn(words, self.palpate(*register, self.dir / "wrong", *wrong, status=2).stderr)
+        self.palpate(*register, out, "--groups", "young=4,old=2")
+        orders = json.loads((out / "registration.json").read_text())["orders"]
+        self.assertEqual([one["participant_number"] for one in orders], [1, 2, 3, 4, 5, 7])
+        text = (out / "registration.md").read_text()
+        for words in ("young 4, old 2", "6 participants with 72 trials in all"):
+            self.assertIn(words, text)
+        with open(out / "simulated" / "planned-effect.csv", newline="") as table:
+            people = {row["participant_id"]: row["group"] for row in csv.DictReader(table)}
+        self.assertEqual(sorted(people.values()), ["old"] * 2 + ["young"] * 4)
+
+        def points(db, status=0):
+            self.palpate("check", out, "--db", db, "--json", self.dir / "check.json", "--force", status=status)
+            return {one["id"]: one for one in json.loads((self.dir / "check.json").read_text())["points"]}
+        found = points(self.simulated(protocol, "--groups", "young=4,old=2"))
+        self.assertNotIn("deviation", {one["finding"] for one in found.values()})
+        self.assertIn("6 participants with the numbers 1 to 5, 7", found["participants"]["sentence"])
+        # One more old participant, and one young one less.
+        found = points(self.simulated(protocol, "--groups", "young=3,old=3", name="other.db"), status=1)
+        self.assertEqual(found["participants"]["finding"], "deviation")
+        self.assertEqual(len(found["participants"]["evidence"]), 2)
+        self.assertIn("7", found["participants"]["evidence"][0])
+        # The protocol's own assignment leaves no gaps.
+        registered = out / "protocol.json"
+        registered.write_text(registered.read_text().replace('"given"', '"balanced"'))
+        points(self.dir / "study.db", status=1)
+        self.assertIn("whose numbers the protocol gives in turn", (self.dir / "check.json").read_text())
+
     def test_options_that_contradict_are_refused(self):
         protocol = self.grouped()
         for text in ("young", "young=", "young=x", "middle=3", "young=1,young=2", "young=0,old=0"):

@@ -224,7 +224,7 @@ TEST(ContactLog, OfASimulatedStudyMatchesItsSamples) {
   const std::atomic<bool> stop{false};
   int with_edges = 0, trials = 0;
   simulate_in_memory(
-      protocol, participants::load_simulated_settings("", 3), 1, 77, stop,
+      protocol, participants::load_simulated_settings("", 3), first_numbers(1), 77, stop,
       [&](int, const data::TrialRecord& record, std::uint64_t contact_ticks) {
         ++trials;
         const stimuli::ObjectSpec* object = nullptr;
