@@ -81,7 +81,8 @@ bool varies_a_group(const SweepPlan& plan) {
   const nlohmann::json space = json_or_discarded(plan.space);
   if (!space.is_object() || !space.contains("parameters")) return false;
   return std::ranges::any_of(space["parameters"], [](const nlohmann::json& one) {
-    return one.is_object() && one.value("of", "").starts_with("group:");
+    return one.is_object() && one.contains("of") && one["of"].is_string() &&
+           one["of"].get_ref<const std::string&>().starts_with("group:");
   });
 }
 

@@ -373,8 +373,8 @@ void Cells::check_sets(const TaskBlock& block) {
       tell(sets[i].place, "expected \"mixing\": \"blocked\" in block '" + block.name +
                               "': a block's own keys cannot change from trial to trial");
     for (const char* const key :
-         {"/stimuli", "/standard", "/factors", "/mixing", "/shared", "/task", "/session", "/practice",
-          "/absent", "/level", "/keys", "/procedure", "/renderers",
+         {"/stimuli", "/standard", "/factors", "/mixing", "/shared", "/task", "/session",
+          "/practice", "/absent", "/level", "/keys", "/procedure", "/renderers",
           // What an answer means: cells are compared.
           "/asks", "/answer", "/intervals", "/scale", "/min", "/max", "/modulus", "/answers",
           "/catch_trials", "/order", "/repetitions"}) {

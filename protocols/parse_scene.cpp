@@ -545,10 +545,10 @@ std::shared_ptr<const std::string> read_kept_file(ObjectReader& section, const c
   constexpr std::size_t kMostBytes = std::size_t{16} << 20U;
   try {
     return std::make_shared<const std::string>(read_whole(path.string(), kMostBytes));
-  } catch (const std::runtime_error& error) {
+  } catch (const std::runtime_error& unreadable) {
     section.faults().add(section.pointer(key), std::string("expected a ") + what +
                                                    " of at most 16 MiB; " + path.string() + ": " +
-                                                   error.what());
+                                                   unreadable.what());
     return nullptr;
   }
 }

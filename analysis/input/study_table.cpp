@@ -210,7 +210,7 @@ void warn_of_unread(const std::vector<std::string>& found, const std::vector<std
   if (more > 0) unread.push_back(std::to_string(more) + " more");
   table.warnings.push_back("Not read: " + joined(unread) +
                            ". Columns of factors stand between practice and timed_out, or are "
-                           "named by the protocol (--design).");
+                           "named by the protocol (--design), as those of several levels are.");
 }
 
 /// The measures of a movement; none: another task.

@@ -167,7 +167,7 @@ class TaskPage {
                                  ", " + std::to_string(cell.answered) + " answered",
                              tables);
     }
-    page_.put_note(without_line_ends(explanation(analysis_.functions) + scale_note(analysis_)));
+    page_.put_note(without_line_ends(explanation(analysis_) + scale_note(analysis_)));
     page_.end_section();
   }
 

@@ -711,7 +711,8 @@ std::string headline(const StudyAnalysis& analysis) {
   return groups.empty() ? conclusion(analysis) : groups + " " + conclusion(analysis);
 }
 
-std::string explanation(const FunctionSettings& functions) {
+std::string explanation(const StudyAnalysis& analysis) {
+  const FunctionSettings& functions = analysis.functions;
   std::string text =
       std::string("Intervals are 95 % intervals. Psychometric functions: ") +
       to_string(functions.shape) + ", lapse rate free up to " + short_number(kMostLapse) +
@@ -720,9 +721,16 @@ std::string explanation(const FunctionSettings& functions) {
   text += functions.shape == protocols::PsychometricShape::weibull
               ? "JND is measured half-way from there to certainty (threshold: at 63 %)"
               : "threshold is half-way from there to certainty";
-  return text +
-         ";\ndetect, same/different: guess rate free. d': log-linear correction.\nBayes: posterior "
-         "mean of the threshold on a grid.\n";
+  text +=
+      ";\ndetect, same/different: guess rate free. d': log-linear correction.\nBayes: posterior "
+      "mean of the threshold on a grid.\n";
+  if (std::ranges::any_of(analysis.cells,
+                          [](const TaskCell& one) { return one.field.has_value(); }))
+    text +=
+        "Levels of several dimensions: the form of the block's procedure, over a cumulative "
+        "normal; "
+        "threshold\nforms over the procedure's own function.\n";
+  return text;
 }
 
 std::string scale_note(const StudyAnalysis& analysis) {

@@ -21,7 +21,7 @@ std::string conclusion(const StudyAnalysis& analysis);
 std::string headline(const StudyAnalysis& analysis);
 
 /// How functions were fitted.
-std::string explanation(const FunctionSettings& functions);
+std::string explanation(const StudyAnalysis& analysis);
 /// Notes on what a table without its protocol does not contain: the scale of levels, and whether
 /// numbers are steps. "": nothing
 std::string scale_note(const StudyAnalysis& analysis);

@@ -434,7 +434,7 @@ std::string task_report_text(const StudyAnalysis& analysis) {
   if (!sentences.empty()) text += "To quote\n";
   for (const std::string& sentence : sentences) text += paragraph_text(sentence);
   if (!sentences.empty()) text += "\n";
-  text += explanation(analysis.functions) + scale_note(analysis);
+  text += explanation(analysis) + scale_note(analysis);
   if (analysis.identification)
     text += "\nTimes and accuracy of identification\n\n" + report_text(*analysis.identification);
   return text;

@@ -227,7 +227,7 @@ std::string reason_not_to_fit(const std::vector<LevelCount>& counts, const Place
     trials += count.trials;
     successes += count.successes;
   }
-  if (trials == 0) return "no trials";
+  if (trials == 0) return "no trials with a level";
   if (!(data.high > data.low)) return "fewer than two levels";
   if (successes == 0) return "no success at any level";
   if (successes == trials) return "no failure at any level";

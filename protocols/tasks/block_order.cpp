@@ -187,6 +187,21 @@ DrawnTrial drawn_trial(const Protocol& protocol, int participant_number, int blo
   return out;
 }
 
+std::vector<std::vector<int>> shared_track_order(const Protocol& protocol, int participant_number,
+                                                 int block) {
+  const TaskBlock& asked = protocol.blocks[static_cast<std::size_t>(block)];
+  std::vector<std::vector<int>> out;
+  for (const BlockTrack& track : tracks_of(asked)) {
+    std::vector<int>& stimuli = out.emplace_back();
+    for (std::uint64_t round = 0; stimuli.size() < most_trials(*track.procedure); ++round) {
+      const std::vector<int> cells =
+          cells_in_round(asked, protocol.seed, participant_number, out.size() - 1, round);
+      stimuli.insert(stimuli.end(), cells.begin(), cells.end());
+    }
+  }
+  return out;
+}
+
 std::vector<int> track_order(const Protocol& protocol, int participant_number, int block,
                              std::uint64_t round) {
   const TaskBlock& asked = protocol.blocks[static_cast<std::size_t>(block)];

@@ -35,6 +35,11 @@ long long reaches_of_track(const TaskBlock& block, ReachTrial kind);
 /// there. A quarter of most_trials_of, at least 10.
 std::size_t most_unanswered(const TaskBlock& block);
 
+/// The stimuli of each track of a block whose cells share tracks, in the order of its answered
+/// trials, for as many as it may have.
+std::vector<std::vector<int>> shared_track_order(const Protocol& protocol, int participant_number,
+                                                 int block);
+
 /// What the seed determines of a trial of an adaptive block, whatever the answers are.
 struct DrawnTrial {
   bool catch_trial = false;

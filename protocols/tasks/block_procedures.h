@@ -14,8 +14,8 @@ namespace palpate::protocols {
 /// The procedures that chose a block's levels.
 struct BlockProcedures {
   std::uint64_t protocol_seed = 0;
-  std::uint64_t index = 0;                   ///< of the block in its protocol
-  std::size_t tracks_of_cell = 0;            ///< of each cell that stands apart; 0: none does
+  std::uint64_t index = 0;         ///< of the block in its protocol
+  std::size_t tracks_of_cell = 0;  ///< of each cell that stands apart; 0: none does
   bool cells_share_tracks = false;
   std::vector<ProcedureSpec> specs;          ///< empty: none
   bool asks_smaller = false;                 ///< compare: the interval with the smaller level

@@ -209,7 +209,7 @@ void check_translations(const Protocol& protocol, const json& given, FaultList& 
 void put_translations(Protocol& protocol, const std::string& language, const std::string& text,
                       const json& given) {
   for (const TextPlace& place : TextPlaces(protocol).take())
-    for (std::string* text : place.copies) *text = given[place.key].get<std::string>();
+    for (std::string* copy : place.copies) *copy = given[place.key].get<std::string>();
   protocol.language = language;
   protocol.translation = text;
 }

@@ -209,11 +209,15 @@ class TaskAnswers final : public StudyAnswers {
         "a line each: session,renderer,shape,w,x,y,z,block,name,track,level,catch,comparison of a "
         "trial that is analysed (the orientation with 17 significant digits" +
         std::string(kinds_.reach ? "; of movements also field, catch or clamp)" : ")") +
-        std::string(adaptive.empty()
-                        ? ""
-                        : "; block,session,number,name with its lines "
-                          "trial,place,catch,comparison,w,x,y,z and round,place,tracks "
-                          "where answers choose the levels") +
+        std::string(
+            adaptive.empty()
+                ? ""
+                : "; block,session,number,name with its lines "
+                  "trial,place,catch,comparison,w,x,y,z and round,place,tracks "
+                  "where answers choose the levels" +
+                      std::string(std::ranges::any_of(blocks_, &TaskBlock::cells_share_tracks)
+                                      ? ", and cells,track,stimuli where they share tracks"
+                                      : "")) +
         ". The SHA-256 of these lines of each participant:"));
     return out;
   }

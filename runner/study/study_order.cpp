@@ -6,10 +6,8 @@
 #include <utility>
 
 #include "data/base/checksum.h"
-#include "protocols/factors.h"
 #include "protocols/groups.h"
 #include "protocols/tasks/block_order.h"
-#include "protocols/tasks/block_tracks.h"
 #include "protocols/tasks/levels.h"
 #include "runner/study/task_words.h"
 
@@ -51,19 +49,14 @@ OrderRow row_of(const Protocol& protocol, const protocols::Trial& trial) {
 }
 
 /// The order of the cells in tracks that they share.
-std::string cell_lines(const Protocol& protocol, int number, const TaskBlock& block) {
+std::string cell_lines(const Protocol& protocol, int number, int index) {
   std::string out;
-  const std::size_t cells = protocols::cells_of(block);
-  const std::vector<protocols::BlockTrack> tracks = protocols::tracks_of(block);
-  for (std::size_t track = 0; track < tracks.size(); ++track) {
-    const std::size_t trials = protocols::most_trials(*tracks[track].procedure);
-    for (std::size_t round = 0; round * cells < trials; ++round) {
-      out += "cells," + std::to_string(track + 1);
-      for (const int stimulus :
-           protocols::cells_in_round(block, protocol.seed, number, track, round))
-        out += "," + protocol.stimuli[static_cast<std::size_t>(stimulus)].name;
-      out += "\n";
-    }
+  int track = 0;
+  for (const auto& stimuli : protocols::shared_track_order(protocol, number, index)) {
+    out += "cells," + std::to_string(++track);
+    for (const int stimulus : stimuli)
+      out += "," + protocol.stimuli[static_cast<std::size_t>(stimulus)].name;
+    out += "\n";
   }
   return out;
 }
@@ -83,7 +76,7 @@ std::string drawn_lines(const Protocol& protocol, int number, int index) {
   std::size_t rounds = 0;
   for (const protocols::ProcedureSpec& procedure : block.procedures)
     rounds = std::max(rounds, protocols::most_trials(procedure));
-  if (block.cells_share_tracks) out += cell_lines(protocol, number, block);
+  if (block.cells_share_tracks) out += cell_lines(protocol, number, index);
   for (std::uint64_t round = 0; round < rounds; ++round) {
     out += "round," + std::to_string(round + 1);
     for (const int track : protocols::track_order(protocol, number, index, round))

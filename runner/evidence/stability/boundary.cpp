@@ -53,7 +53,7 @@ rendering::SceneObject ridge(double h, double x, const stimuli::Material& materi
                 {{x, 0, -h * std::numbers::sqrt2}, turned_about_y(std::numbers::pi / 4)}, material,
                 index);
 }
-constexpr double kHalf = 0.015, kSoftTick = 0.001;  // m, s
+constexpr double kSoftHalf = 0.015, kSoftTick = 0.001;  // m, s
 
 std::vector<rendering::SceneObject> objects_of(ContactCase contact_case, bool ray,
                                                const stimuli::Material& material) {
@@ -496,10 +496,10 @@ constexpr int kHeldTicks = 1500, kWatchedTicks = 200;
 constexpr int kLongestHeldTicks = 12500, kLongWatchedTicks = 1000;  // for undamped bodies
 
 rendering::SoftObject slab(const SoftCase& what) {
-  stimuli::SolidMesh mesh = stimuli::mesh_of_box({0.06, 0.06, 2 * kHalf}, {4, 4, 2});
+  stimuli::SolidMesh mesh = stimuli::mesh_of_box({0.06, 0.06, 2 * kSoftHalf}, {4, 4, 2});
   std::vector<std::uint32_t> held;
   for (std::uint32_t i = 0; i < mesh.nodes.size(); ++i) {
-    if (mesh.nodes[i].z < -0.999 * kHalf) held.push_back(i);
+    if (mesh.nodes[i].z < -0.999 * kSoftHalf) held.push_back(i);
   }
   const rendering::SoftSettings settings{
       .material = {.young = what.young, .poisson = what.poisson, .damping = what.damping},
@@ -729,8 +729,8 @@ SoftSwing press_and_hold(const SoftCase& what) {
   SoftSwing out{.what = what};
   out.accepted = rendering::coupling_is_stable(
       {.young = what.young, .poisson = what.poisson, .damping = what.damping}, what.rate);
-  Vec3 at(what.x, what.y, kHalf + what.radius + 0.0005);
-  const double goal = kHalf + what.radius - what.depth, fall = what.speed * kSoftTick;
+  Vec3 at(what.x, what.y, kSoftHalf + what.radius + 0.0005);
+  const double goal = kSoftHalf + what.radius - what.depth, fall = what.speed * kSoftTick;
   const auto tick = [&] {
     const double step = std::max(-fall, goal - at.z);
     at.z += step;

@@ -159,7 +159,7 @@ TEST(PsychometricFit, IntervalsReachOverAValley) {
 }
 
 TEST(PsychometricFit, SaysWhereThereIsNone) {
-  EXPECT_EQ(fit_psychometric({}, {}).undefined, "no trials");
+  EXPECT_EQ(fit_psychometric({}, {}).undefined, "no trials with a level");
   EXPECT_EQ(fit_psychometric({{1, 9, 4}}, {}).undefined, "fewer than two levels");
   EXPECT_EQ(fit_psychometric({{1, 9, 0}, {2, 9, 0}}, {}).undefined, "no success at any level");
   EXPECT_EQ(fit_psychometric({{1, 9, 9}, {2, 9, 9}}, {}).undefined, "no failure at any level");

@@ -210,6 +210,8 @@ TEST(Factors, SharedTracksGoOverAllCells) {
   }
   ASSERT_EQ(answers.size(), 2U);
   std::set<std::vector<int>> orders;
+  const std::vector<std::vector<int>> fixed = shared_track_order(protocol, 2, 1);
+  ASSERT_EQ(fixed.size(), 2U);
   for (const auto& [track, own] : answers) {
     Procedure again = procedures.begin(2, track);
     for (const Response& answer : own) {
@@ -218,6 +220,9 @@ TEST(Factors, SharedTracksGoOverAllCells) {
     }
     const std::vector<int>& shown = stimuli[track];
     ASSERT_GE(shown.size(), 12U);
+    const std::vector<int>& order = fixed[static_cast<std::size_t>(track) - 1];
+    ASSERT_GE(order.size(), 30U) << "for every trial that the track may have";
+    EXPECT_TRUE(std::equal(shown.begin(), shown.end(), order.begin()));
     for (std::size_t round = 0; round + 6 <= shown.size(); round += 6) {
       const std::vector<int> cells(shown.begin() + round, shown.begin() + round + 6);
       EXPECT_EQ(std::set<int>(cells.begin(), cells.end()).size(), 6U) << "each cell once";
