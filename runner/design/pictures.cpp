@@ -7,6 +7,7 @@
 #include <glm/common.hpp>
 #include <glm/gtc/quaternion.hpp>
 #include <glm/trigonometric.hpp>
+#include <iterator>
 #include <limits>
 #include <map>
 #include <set>
@@ -338,6 +339,30 @@ class Pictures {
   std::map<std::string, Json> varied_;  // by stimulus
 };
 
+/// The movements of blocks of reaches, each place once.
+Json movements_of(const Protocol& protocol) {
+  Json out = Json::array();
+  for (const TaskBlock& block : protocol.blocks) {
+    if (!block.reaching) continue;
+    const protocols::ReachingSpec& reaching = *block.reaching;
+    Json places{{"home_m", as_json(reaching.home)},
+                {"home_radius_m", reaching.home_radius},
+                {"targets_m", Json::array()},
+                {"target_radius_m", reaching.target_radius}};
+    for (const Vec3& target : reaching.targets) places["targets_m"].push_back(as_json(target));
+    auto known = std::find_if(out.begin(), out.end(),
+                              [&](const Json& one) { return one["places"] == places; });
+    if (known == out.end()) {
+      out.push_back({{"blocks", Json::array()}, {"places", places}});
+      known = std::prev(out.end());
+    }
+    Json& blocks = (*known)["blocks"];  // cells of one have one name
+    if (std::find(blocks.begin(), blocks.end(), block.name) == blocks.end())
+      blocks.push_back(block.name);
+  }
+  return out;
+}
+
 }  // namespace
 
 Json picture_answer(const std::string& text, const std::string& path) {
@@ -346,7 +371,7 @@ Json picture_answer(const std::string& text, const std::string& path) {
   pictures.add(protocol, "");
   for (std::size_t i = 0; i < protocol.group_protocols.size(); ++i)
     pictures.add(*protocol.group_protocols[i], protocol.groups.names[i]);
-  Json out{{"stimuli", pictures.all()}};
+  Json out{{"stimuli", pictures.all()}, {"movements", movements_of(protocol)}};
   Json& stylus = out["stylus"];
   stylus = {{"length_m", protocol.stylus.length}, {"grip_m", protocol.stylus.grip}};
   for (const protocols::ToolSegmentSpec& segment : protocol.tool.segments)

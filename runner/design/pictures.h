@@ -7,7 +7,8 @@
 namespace palpate::runner::design {
 
 /// The surfaces of the stimuli in their own frames, m, with what is drawn on and about them, and
-/// the stylus that touches them: {"stimuli": [...], "stylus": {...}}. A stimulus:
+/// the stylus that touches them: {"stimuli": [...], "movements": [{"blocks", "places": {"home_m",
+/// "home_radius_m", "targets_m", "target_radius_m"}}], "stylus": {...}}. A stimulus:
 ///   "name", "written"    its name; in a cell or group also its JSON there
 ///   "corners", "triangles", "size_m", "all_triangles"  of its surface
 ///   "marks", "fields"    of its texture (as SurfaceMarks), about it

@@ -64,6 +64,26 @@ function parts_of({corners = [], triangles = [], marks, fields = []}, {colour, o
   return {parts, radius};
 }
 
+/** The places of movements, about their middle: the start, the ways and the targets. */
+function parts_of_movements({home_m, home_radius_m, targets_m, target_radius_m}) {
+  const all = [home_m, ...targets_m], ends = pick => [0, 1, 2].map(k => pick(...all.map(at => at[k])));
+  const centre = times(0.5, add(ends(Math.min), ends(Math.max)));
+  const [home, ...targets] = all.map(at => sub(at, centre)), radius = Math.max(...all.map(at => size(sub(at, centre)))) + Math.max(home_radius_m, target_radius_m);
+  const ways = [], marks = [];
+  put_dot(ways, home, home_radius_m);
+  for (const target of targets) {
+    put_rod(ways, home, target, 0.01 * radius);
+    put_dot(marks, target, target_radius_m);
+  }
+  return {radius, parts: [{mesh: {vertices: new Float32Array(ways)}, colour: 'virtual'}, {mesh: {vertices: new Float32Array(marks)}, colour: 'ideal'}]};
+}
+
+/** "from its start to 2 targets, 80 mm away and 10 mm wide" */
+function movements_in_words({home_m, targets_m, target_radius_m}) {
+  const mm = metres => +(1000 * metres).toPrecision(3), far = [...new Set(targets_m.map(at => mm(size(sub(at, home_m)))))].sort((a, b) => a - b);
+  return `from its start to ${targets_m.length} ${targets_m.length === 1 ? 'target' : 'targets'}, ${far.join(', ')} mm away and ${mm(2 * target_radius_m)} mm wide`;
+}
+
 /** The last key of a JSON pointer: "size_m" of "/size_m/0". */
 const key_of = path => path.split('/').filter(part => part && !/^\d+$/.test(part)).at(-1) ?? path;
 /** The key of a number that levels vary: a turn is in degrees. */
@@ -120,7 +140,7 @@ export class PictureView {
   }
 
   /** Shows an answer of "picture". `written`: the stimuli of the file, for what a picture cannot show. */
-  show({stimuli, stylus}, written) {
+  show({stimuli, movements, stylus}, written) {
     const of_file = new Map(written.map(one => [one?.name, one ?? {}]));
     this.shapes = stimuli.flatMap(one => {
       const sounds = Boolean((one.written ?? of_file.get(one.name))?.sound);
@@ -129,6 +149,7 @@ export class PictureView {
       return [{name, label: one.at?.map(({path, value}) => value_in_words(varied_key(path), value)).join(', '), size: one.size_m, turn, ...parts_of(one, {sounds})},
         ...(one.seen ? [{name: `${name}, as seen`, label: 'as seen', size: one.seen.size_m, turn, ...parts_of(one.seen, {colour: 'ideal', opacity: kGhost})}] : [])];
     }).filter(one => one.parts.length > 0);
+    for (const {blocks, places} of movements) this.shapes.push({name: `movements, ${blocks.join(', ')}`, label: 'movements', ...parts_of_movements(places)});
     this.stylus = stylus;
     this.root.querySelector('.sizes').replaceChildren(...stimuli.map(one => {
       const words = [one.size_m ? in_mm(one.size_m) : 'no surface'];
@@ -138,7 +159,7 @@ export class PictureView {
       if (one.marks?.every > 1) words.push(`every ${one.marks.every}th ridge is drawn`);
       if (one.all_triangles) words.push(`drawn with ${one.triangles.length} of its ${one.all_triangles} triangles`);
       return element('li', {}, element('b', {text: one.group ? `${one.name}, group ${one.group}` : one.name}), ` ${words.join('; ')}`);
-    }));
+    }), ...movements.map(({blocks, places}) => element('li', {}, element('b', {text: 'movements'}), ` ${movements_in_words(places)} (${blocks.join(', ')})`)));
     const note = this.root.querySelector('.note');
     note.hidden = Boolean(this.paint);
     note.textContent = 'This browser has no WebGL: sizes in words.';

@@ -330,7 +330,18 @@ class Views(BrowserCase):
     def test_fields_textures_and_what_is_seen_are_drawn(self):
         orange, grey = "(r, g, b) => r > 100 && r > 1.6 * g && g > 1.5 * b", "(r, g, b) => Math.abs(r - g) < 22 && Math.abs(g - b) < 22 && r < 140"
         self.page(self.copy("force-field.json"))
-        self.assertEqual(self.js("design.picture.shapes.map(one => one.name)"), ["curl"])  # a field of 0 is nothing
+        blocks = json.loads((self.dir / "p.json").read_text())["blocks"]
+        movements = f"movements, {', '.join(block['name'] for block in blocks)}"
+        self.assertEqual(self.js("design.picture.shapes.map(one => one.name)"), ["curl", movements])  # a field of 0 is nothing
+        words = self.js("[...document.querySelectorAll('#picture .sizes li')].at(-1).textContent")
+        self.assertIn("movements from its start to 2 targets, 80 mm away and 10 mm wide (baseline", words)
+        start, target = self.js("[0, 1].map(i => design.picture.shapes[1].parts[i].mesh.vertices.length / 6)")
+        self.assertEqual((start > target, target), (True, 2 * 8 * 3))  # an octahedron each
+        blue = "(r, g, b) => b > 100 && b > 1.3 * g && g > 1.5 * r"
+        with_targets = self.drawn(blue)
+        self.js("design.picture.shapes[1].parts.pop()")
+        self.assertGreater(with_targets, self.drawn(blue) + 20)  # the stylus stays
+        self.js("design.picture.shapes.pop()")
         self.assertGreater(self.drawn(orange), 100)
         path = self.copy("grating-roughness.json", "q.json")
         self.page(path)
