@@ -127,6 +127,7 @@ std::vector<std::string> differences(const SweepPlan& a, const SweepPlan& b) {
   values("parameters", a.parameters, b.parameters);
   values("shapes", a.shapes, b.shapes);
   values("renderers", a.renderers, b.renderers);
+  values("columns for the cells of factors", a.has_cells, b.has_cells);
   return out;
 }
 
@@ -145,8 +146,10 @@ std::vector<TaskCellColumns> task_columns(const SweepPlan& plan) {
                            columns_of(block, stimulus, renderer, group, measures)});
         };
         for (const std::string& stimulus : block.stimuli) {
-          if (block.cells.empty()) add({stimulus}, measures_of(block.task));
-          for (const auto& levels : block.cells) add({stimulus, levels}, measures_of(block.task));
+          const bool apart = plan.has_cells && !block.cells.empty();
+          if (!apart) add({stimulus}, measures_of(block.task));
+          if (apart)
+            for (const auto& levels : block.cells) add({stimulus, levels}, measures_of(block.task));
         }
         if (block.task == "identify") add({}, {"bits"});
       }

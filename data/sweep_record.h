@@ -23,6 +23,8 @@ struct SweepPlan {
   std::string program_version;
   std::vector<std::string> parameters;         ///< names, as the space lists them
   std::vector<std::string> shapes, renderers;  ///< names, as the protocol lists them
+  /// false: of a file from before cells of factors had columns; those of their blocks are empty.
+  bool has_cells = true;
 };
 
 /// A sentence for each difference between two plans, a's value first; empty: they are the same

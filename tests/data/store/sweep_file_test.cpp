@@ -185,6 +185,28 @@ void make_version_1(const std::string& path, const std::string& from) {
   old.exec("PRAGMA user_version = 1");
 }
 
+TEST_F(Sweeps, ReadsFilesFromBeforeCellsHadColumns) {
+  SweepPlan plan = a_sweep_plan();
+  plan.protocol = R"({"version": 2, "renderers": ["ray"], "factors": [
+      {"name": "size", "levels": [{"name": "s", "set": {}}, {"name": "l", "set": {}}]}],
+      "blocks": [{"name": "b", "task": "rate", "stimuli": ["ball"], "factors": ["size"]}]})";
+  plan.has_cells = false;
+  EXPECT_EQ(figure_columns(plan).size(), 2U);
+  SweepFile::open(path_, plan).finish();
+  EXPECT_FALSE(SweepFile::open(path_).plan().has_cells);
+  plan.has_cells = true;
+  EXPECT_EQ(figure_columns(plan).size(), 4U);
+  try {
+    SweepFile::open(path_, plan);
+    FAIL() << "rows of other columns";
+  } catch (const StoreError& error) {
+    EXPECT_NE(std::string(error.what()).find("columns for the cells of factors"),
+              std::string::npos);
+  }
+  SweepFile::open(folder_ / "b.sweep", plan).finish();
+  EXPECT_TRUE(SweepFile::open(folder_ / "b.sweep").plan().has_cells);
+}
+
 TEST_F(Sweeps, ReadsVersion1AndSealsItWhenResumed) {
   make_sweep(folder_ / "b.sweep", {1, 2, 4}, true);
   make_version_1(path_, folder_ / "b.sweep");
