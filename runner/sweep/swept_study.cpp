@@ -250,17 +250,15 @@ std::string place_of(std::size_t parameter, const SweepParameter& one, std::size
   return one.paths.size() == 1 ? place : child_pointer(place, path);
 }
 
-std::string joined_names(const std::vector<std::string>& names) {
+std::string listed(const std::vector<std::string>& words) {
   std::string out;
-  for (const std::string& name : names) out += (out.empty() ? "" : ", ") + name;
+  for (const std::string& word : words) out += (out.empty() ? "" : ", ") + word;
   return out;
 }
 
 std::string near_text(const json& document, const std::string& pointer) {
-  std::string out;
-  for (const std::string& place : near_pointers(document, pointer))
-    out += (out.empty() ? "" : ", ") + place;
-  return out.empty() ? "" : "; near to it: " + out;
+  const std::string near = listed(near_pointers(document, pointer));
+  return near.empty() ? "" : "; near to it: " + near;
 }
 
 bool is_whole(const json& value) {
@@ -337,7 +335,7 @@ void SweptStudy::check_participant(const SweepParameter& one, std::size_t number
     const GroupAssignment groups = data::read_stored_protocol(protocol_.dump()).groups;
     if (groups.find(one.group) == groups.names.size())
       faults.add(child_pointer(child_pointer("/parameters", number), "of"),
-                 groups.any() ? "expected a group of the protocol: " + joined_names(groups.names) +
+                 groups.any() ? "expected a group of the protocol: " + listed(groups.names) +
                                     "; found '" + one.group + "'"
                               : "expected 'participant' or 'protocol': the protocol has no groups");
     if (const json* const own = value_at(settings_, "/groups/" + one.group))
