@@ -475,10 +475,11 @@ void read_crossing(ObjectReader& reader, const Protocol& protocol, TaskBlock& bl
     return;
   }
   if (block.cells_share_tracks && (block.cells_apart || !is_adaptive(block)))
-    reader.faults().add(reader.pointer("shared"),
-                        block.cells_apart
-                            ? "expected no shared tracks with \"mixing\": \"blocked\""
-                            : "expected a procedure: without one no track goes on over cells");
+    reader.faults().add(
+        reader.pointer("shared"),
+        block.cells_apart
+            ? "expected no shared tracks with \"mixing\": \"blocked\""
+            : "expected a procedure other than constant stimuli, whose tracks cells can share");
   if (!(value->is_array() || value->is_object()) || value->empty()) {
     reader.faults().add(reader.pointer("factors"),
                         "expected a list of factors, or an object of a list of levels for each" +
