@@ -41,11 +41,16 @@ export function stimulus_in_words(stimulus) {
   return words;
 }
 
+const mm = metres => +(1000 * metres).toPrecision(3);
+/** The middle of the box about points. */
+function middle_of(points) {
+  const ends = pick => [0, 1, 2].map(k => points.reduce((v, p) => pick(v, p[k]), points[0]?.[k] ?? 0));
+  return times(0.5, add(ends(Math.min), ends(Math.max)));
+}
+
 /** What is drawn of a stimulus about its centre: surfaces of one colour each. `sounds`: whether its contacts are heard. */
 function parts_of({corners = [], triangles = [], marks, fields = []}, {colour, opacity, sounds} = {}) {
-  const ends = pick => [0, 1, 2].map(k => corners.reduce((v, p) => pick(v, p[k]), corners[0]?.[k] ?? 0));
-  const centre = times(0.5, add(ends(Math.min), ends(Math.max)));
-  const own = corners.map(p => sub(p, centre)), reach = own.reduce((r, p) => Math.max(r, size(p)), 0);
+  const centre = middle_of(corners), own = corners.map(p => sub(p, centre)), reach = own.reduce((r, p) => Math.max(r, size(p)), 0);
   const out = fields.some(field => extent_of(field) === 0) ? kOutOf : 1;
   const radius = Math.max((sounds ? kOutOfSound : out) * reach, out * reach, ...fields.map(extent_of), reach === 0 && fields.length ? kFieldAlone : 0);
   const parts = own.length ? [{mesh: surface_of(own, triangles), colour, opacity}] : [];
@@ -66,9 +71,8 @@ function parts_of({corners = [], triangles = [], marks, fields = []}, {colour, o
 
 /** The places of movements, about their middle: the start, the ways and the targets. */
 function parts_of_movements({home_m, home_radius_m, targets_m, target_radius_m}) {
-  const all = [home_m, ...targets_m], ends = pick => [0, 1, 2].map(k => pick(...all.map(at => at[k])));
-  const centre = times(0.5, add(ends(Math.min), ends(Math.max)));
-  const [home, ...targets] = all.map(at => sub(at, centre)), radius = Math.max(...all.map(at => size(sub(at, centre)))) + Math.max(home_radius_m, target_radius_m);
+  const all = [home_m, ...targets_m], centre = middle_of(all), about = all.map(at => sub(at, centre));
+  const [home, ...targets] = about, radius = Math.max(...about.map(size)) + Math.max(home_radius_m, target_radius_m);
   const ways = [], marks = [];
   put_dot(ways, home, home_radius_m);
   for (const target of targets) {
@@ -80,7 +84,7 @@ function parts_of_movements({home_m, home_radius_m, targets_m, target_radius_m})
 
 /** "from its start to 2 targets, 80 mm away and 10 mm wide" */
 function movements_in_words({home_m, targets_m, target_radius_m}) {
-  const mm = metres => +(1000 * metres).toPrecision(3), far = [...new Set(targets_m.map(at => mm(size(sub(at, home_m)))))].sort((a, b) => a - b);
+  const far = [...new Set(targets_m.map(at => mm(size(sub(at, home_m)))))].sort((a, b) => a - b);
   return `from its start to ${targets_m.length} ${targets_m.length === 1 ? 'target' : 'targets'}, ${far.join(', ')} mm away and ${mm(2 * target_radius_m)} mm wide`;
 }
 
@@ -96,7 +100,7 @@ function number_in_words({name, path, value, least, most}) {
 }
 
 /** "varied: radius 20 mm to 30 mm (practice, size)": the levels of a stimulus, blocks with the same levels together. */
-export function levels_in_words(varied = []) {
+function levels_in_words(varied = []) {
   const blocks = new Map();
   for (const {block, group, numbers} of varied) {
     const words = numbers.map(number_in_words).join(', ');
@@ -105,7 +109,7 @@ export function levels_in_words(varied = []) {
   return [...blocks].map(([words, of]) => `varied: ${words} (${of.join(', ')})`);
 }
 
-const in_mm = metres => metres.map(m => +(1000 * m).toPrecision(3)).join(' × ') + ' mm';
+const in_mm = metres => metres.map(mm).join(' × ') + ' mm';
 
 export class PictureView {
   constructor() {
