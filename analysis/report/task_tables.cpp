@@ -727,9 +727,9 @@ std::string explanation(const StudyAnalysis& analysis) {
   if (std::ranges::any_of(analysis.cells,
                           [](const TaskCell& one) { return one.field.has_value(); }))
     text +=
-        "Levels of several dimensions: the form of the block's procedure, over a cumulative "
-        "normal; "
-        "threshold\nforms over the procedure's own function.\n";
+        "Levels of several dimensions: the form of the block's procedure over a cumulative "
+        "normal;\n"
+        "threshold forms over the procedure's own function.\n";
   return text;
 }
 
