@@ -208,9 +208,11 @@ void warn_of_unread(const std::vector<std::string>& found, const std::vector<std
   const std::size_t more = unread.size() - std::min(unread.size(), kMost);
   unread.resize(std::min(unread.size(), kMost));
   if (more > 0) unread.push_back(std::to_string(more) + " more");
-  table.warnings.push_back("Not read: " + joined(unread) +
-                           ". Columns of factors stand between practice and timed_out, or are "
-                           "named by the protocol (--design), as those of several levels are.");
+  table.warnings.push_back(
+      "Not read: " + joined(unread) +
+      ". Columns of factors stand between practice and timed_out, or are "
+      "named by the protocol (--design), which also names those of levels of several "
+      "dimensions.");
 }
 
 /// The measures of a movement; none: another task.
@@ -613,6 +615,18 @@ StudyTable of_shapes(TrialTable times, const std::string& source,
   return table;
 }
 
+/// Some kPlaces places of the tip.
+std::vector<Vec3> path_of(const data::TrialRecord& record) {
+  constexpr std::size_t kPlaces = 80;
+  std::vector<Vec3> path;
+  const std::size_t every = std::max<std::size_t>(1, record.samples.size() / kPlaces);
+  for (std::size_t i = 0; i < record.samples.size(); i += every) {
+    const auto& tip = record.samples[i].tip;
+    path.emplace_back(tip[0], tip[1], tip[2]);
+  }
+  return path;
+}
+
 }  // namespace
 
 const std::string& GroupLabels::add(const std::string& participant, const std::string& group) {
@@ -652,22 +666,6 @@ void put_protocols(const std::vector<ProtocolText>& protocols, const std::string
     if (block != nullptr && block->cells_share_tracks) trial.shape = base_name(trial.shape);
   }
 }
-
-namespace {
-
-/// Some kPlaces places of the tip.
-std::vector<Vec3> path_of(const data::TrialRecord& record) {
-  constexpr std::size_t kPlaces = 80;
-  std::vector<Vec3> path;
-  const std::size_t every = std::max<std::size_t>(1, record.samples.size() / kPlaces);
-  for (std::size_t i = 0; i < record.samples.size(); i += every) {
-    const auto& tip = record.samples[i].tip;
-    path.emplace_back(tip[0], tip[1], tip[2]);
-  }
-  return path;
-}
-
-}  // namespace
 
 StudyTrial study_trial_of(const std::string& participant, const data::TrialRecord& record) {
   StudyTrial trial;
