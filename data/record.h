@@ -202,6 +202,14 @@ struct Participant {
   std::optional<std::uint64_t> seed;  ///< of a simulated participant
 };
 
+/// When the groups of a study were unmasked (base/group_assignment.h).
+struct Unmasking {
+  std::int64_t utc_ns = 0;  ///< since 1970
+  std::string person;       ///< who did it
+  std::string program_version;
+  int participants = 0;  ///< with at least one completed trial at that time
+};
+
 /// Whether a participant can have this code: 1 to 32 ASCII letters and digits.
 bool is_participant_code(std::string_view code);
 

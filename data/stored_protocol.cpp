@@ -120,6 +120,8 @@ GroupAssignment read_groups(const nlohmann::json& protocol) {
     out.seed = seed->is_number_integer() ? seed->get<std::uint64_t>()
                                          : static_cast<std::uint64_t>(seed->get<double>());
   }
+  if (const auto masked = groups->find("masked"); masked != groups->end() && *masked == true)
+    out.mask();
   return out;
 }
 

@@ -90,6 +90,23 @@ std::vector<json> read_groups(ObjectReader& reader, Protocol& protocol) {
       section.faults().add(section.pointer("block"),
                            "expected it with \"assign\": \"blocked\" only");
     read_patches(section, groups, patches);
+    bool masked = false;
+    section.boolean("masked", masked);
+    if (masked && groups.rule == Rule::given)
+      section.faults().add(
+          section.pointer("masked"),
+          "expected it with \"assign\": \"balanced\" or \"blocked\": who names the "
+          "group of a participant knows it");
+    groups.seed = protocol.seed;
+    if (!masked) return;
+    const std::vector<std::string> names = groups.names;
+    groups.mask();
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      if (groups.find(names[i]) < names.size())
+        section.faults().add(
+            child_pointer(section.pointer("names"), i),
+            "expected another name than '" + names[i] + "', which stands for a masked group");
+    }
   });
   return patches;
 }

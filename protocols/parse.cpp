@@ -380,6 +380,7 @@ Protocol read_design(const json& root, const MeshFiles& files, FaultList& faults
   reader.section("material",
                  [&](ObjectReader& section) { read_material(section, protocol.material); });
   read_stimuli(reader, protocol, files);
+  reader.seed("seed", protocol.seed);
   if (protocol.version == 2) {
     read_tasks(reader, protocol, files);
     read_view(reader, protocol);
@@ -394,9 +395,7 @@ Protocol read_design(const json& root, const MeshFiles& files, FaultList& faults
                std::any_of(protocol.stimuli.begin(), protocol.stimuli.end(),
                            [](const auto& stimulus) { return stimulus.object.soft.has_value(); }));
   reader.boolean("samples", protocol.samples);
-  reader.seed("seed", protocol.seed);
   reader.refuse_unknown_keys();
-  protocol.groups.seed = protocol.seed;
   check_reaching(protocol, faults);
   if (faults.empty()) add_cells(root, files, protocol, faults);
   if (faults.empty()) add_channels(protocol);
@@ -449,10 +448,10 @@ void add_group_protocols(const json& root, const std::vector<json>& patches, con
       own.throw_if_any();
     } catch (const InputError& error) {
       for (const Fault& fault : error.faults())
-        add_group_fault(fault, protocol.groups.names[i], patches[i], faults);
+        add_group_fault(fault, protocol.groups.true_name(i), patches[i], faults);
       continue;
     }
-    check_variation(protocol, *group, protocol.groups.names[i], patches[i], faults);
+    check_variation(protocol, *group, protocol.groups.true_name(i), patches[i], faults);
     group->groups = protocol.groups;
     group->source_text = protocol.source_text;
     group->sha256 = protocol.sha256;

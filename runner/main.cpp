@@ -74,6 +74,8 @@ constexpr Command kCommands[] = {
      palpate::runner::commands::stability_command},
     {"sweep", "simulated studies over a space of settings",
      palpate::runner::commands::sweep_command},
+    {"unmask", "tell the groups of a study whose groups are masked",
+     palpate::runner::commands::unmask_command},
     {"validate", "check a protocol and list all its faults",
      palpate::runner::commands::validate_command},
     {"watch", "a page that shows a stored trial", palpate::runner::commands::watch_command},

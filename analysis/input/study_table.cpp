@@ -359,12 +359,18 @@ void note_factors_of_trials(StudyTable& table) {
   note_factors(found, table);
 }
 
-/// Adds the procedures of a protocol, for each of its groups.
+/// Adds the procedures of a protocol, for each of its groups; of masked ones by both names.
 void add_procedures(const std::string& sha256, const std::string& text, const std::string& path,
                     StudyTable& table) {
-  for (const auto& [group, patched] : protocols::texts_of_groups(text))
-    table.procedures[procedures_key(sha256, group)] =
+  GroupAssignment groups = data::read_stored_protocol(text).groups;
+  const std::vector<std::string> shown = groups.names;
+  groups.unmask();
+  for (const auto& [group, patched] : protocols::texts_of_groups(text)) {
+    const auto& found = table.procedures[procedures_key(sha256, group)] =
         protocols::procedures_of_blocks(patched, path);
+    if (const std::size_t at = groups.find(group); at < shown.size() && shown[at] != group)
+      table.procedures[procedures_key(sha256, shown[at])] = found;
+  }
 }
 
 /// Sets the groups of the participants from the trials, and what there is to say of them.
@@ -393,6 +399,15 @@ void label_groups(const std::vector<std::string>& names, StudyTable& table) {
   for (const std::string& name : without.names()) text += (text.empty() ? "" : ", ") + name;
   table.warnings.push_back("Without a group, and left out of the comparison of groups: " + text +
                            ".");
+}
+
+/// The names of a protocol's groups, masked unless a trial has one that is not.
+std::vector<std::string> names_in(const StudyTable& table, GroupAssignment groups) {
+  const bool named = std::ranges::any_of(table.trials, [&](const StudyTrial& trial) {
+    return std::ranges::find(groups.true_names, trial.group) != groups.true_names.end();
+  });
+  if (named) groups.unmask();
+  return groups.listed();
 }
 
 void warn_of_alike_names(StudyTable& table) {
@@ -581,6 +596,9 @@ StudyTable read_tasks_store(data::Store& store, const std::string& protocol) {
       protocols.push_back({one.name, one.sha256, one.text, "", ""});
   }
   put_protocols(protocols, path, table);
+  if (groups.masked() && !table.group_labels.of.empty())
+    table.warnings.emplace_back(
+        "The groups are masked: letters stand for their names until 'palpate unmask'.");
   table.people = data::participant_columns(store);
   std::set<std::string> shown;
   for (const StudyTrial& trial : table.trials) shown.insert(trial.participant);
@@ -655,7 +673,7 @@ void put_protocols(const std::vector<ProtocolText>& protocols, const std::string
     const bool used = std::ranges::any_of(
         table.protocols, [&](const auto& known) { return known.second == one.sha256; });
     if (used && table.title.empty()) table.title = stored.title;
-    for (const std::string& name : stored.groups.names) note_once(name, groups);
+    for (const std::string& name : names_in(table, stored.groups)) note_once(name, groups);
     note_factors(stored.factors, table);
     for (const std::string& effect : stored.tests) note_once(effect, table.tests);
   }

@@ -1,14 +1,16 @@
 #include "data/base/group_assignment.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "data/base/random.h"
 
 namespace palpate {
 namespace {
 
-// The stream of a protocol's seed; part of the meaning of a seed: never renumber it.
+// Streams of a protocol's seed; part of the meaning of a seed: never renumber them.
 constexpr std::uint64_t kGroups = 900;
+constexpr std::uint64_t kMasks = 901;
 
 /// The groups of block `index` (from 0), in order.
 std::vector<std::size_t> permuted_block(const GroupAssignment& groups, int index) {
@@ -37,6 +39,23 @@ Place place_of(const GroupAssignment& groups, int number) {
 }
 
 }  // namespace
+
+void GroupAssignment::mask() {
+  if (masked()) return;
+  true_names = names;
+  for (std::size_t i = 0; i < names.size(); ++i) names[i] = static_cast<char>('A' + i);
+  Random(seed, {kMasks}).shuffle(names);
+}
+
+void GroupAssignment::unmask() {
+  if (masked()) names = std::exchange(true_names, {});
+}
+
+std::vector<std::string> GroupAssignment::listed() const {
+  std::vector<std::string> out = names;
+  if (masked()) std::ranges::sort(out);
+  return out;
+}
 
 std::size_t GroupAssignment::group(int number) const { return place_of(*this, number).group; }
 

@@ -80,6 +80,7 @@ ExportClock::ExportClock(const std::vector<ProtocolInfo>& protocols, Times times
 
 ExportClock::ExportClock(Store& store, Times times) : ExportClock(store.protocols(), times) {
   torque_ = TorqueNotes(store);
+  groups_ = ParticipantGroups(store);
   if (relative()) firsts_ = store.first_onsets();
 }
 

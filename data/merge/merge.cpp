@@ -32,6 +32,7 @@
 #include "data/store/frames.h"
 #include "data/store/protocol_rows.h"
 #include "data/store/schema.h"
+#include "data/store/unmaskings.h"
 
 namespace palpate::data {
 namespace {
@@ -156,9 +157,14 @@ class Planner {
 
 MergePlan Planner::plan(std::deque<StationDatabase>& stations, NumberConflict clash) {
   for (StationDatabase& station : stations) {
-    guarded(station.path(),
-            [&] { plan_.tombstones.add(Tombstones::read(station.db(), station.path())); });
+    guarded(station.path(), [&] {
+      plan_.tombstones.add(Tombstones::read(station.db(), station.path()));
+      std::ranges::copy(read_unmaskings(station.db(), station.path()),
+                        std::back_inserter(plan_.unmaskings));
+    });
   }
+  std::ranges::sort(plan_.unmaskings, {},
+                    [](const Unmasking& one) { return std::pair(one.utc_ns, one.person); });
   for (StationDatabase& station : stations)
     guarded(station.path(), [&] { add_protocols(station); });
   require_same_protocols(stations);
@@ -666,6 +672,7 @@ void fill(SQLite::Database& db, const std::string& out, const MergePlan& plan,
       }
     }
   }
+  for (const Unmasking& one : plan.unmaskings) write_unmasking(db, out, one);
   // `cleared`: no row of the withdrawn participants was ever in this file.
   for (const auto& tombstone : plan.tombstones.all()) Tombstones::put(db, tombstone, true);
 }

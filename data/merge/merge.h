@@ -100,6 +100,7 @@ struct PlannedProtocol {
 struct MergePlan {
   std::vector<PlannedProtocol> protocols;  ///< by name, then checksum
   Tombstones tombstones;
+  std::vector<Unmasking> unmaskings;  ///< of all inputs, by time
   std::vector<ExcludedParticipant> excluded;
   std::vector<RenumberedParticipant> renumbered;
   std::int64_t sessions = 0;

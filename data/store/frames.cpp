@@ -3,36 +3,25 @@
 #include <SQLiteCpp/Statement.h>
 
 #include "data/base/checksum.h"
-#include "data/errors.h"
+#include "data/store/late_table.h"
 
 namespace palpate::data {
 namespace {
 
-constexpr const char* kTable =
+constexpr LateTable kFrames{
+    "frames",
     "CREATE TABLE frames (attempt_id INTEGER NOT NULL REFERENCES attempts (id), frame INTEGER NOT "
     "NULL CHECK (frame >= 1), swap_ns INTEGER NOT NULL, pose_ns INTEGER NOT NULL, delay_ns INTEGER "
-    "NOT NULL CHECK (delay_ns >= 0), PRIMARY KEY (attempt_id, frame)) STRICT, WITHOUT ROWID";
-
-std::string table_of(SQLite::Database& db) {
-  SQLite::Statement find(db, "SELECT sql FROM sqlite_schema WHERE name = 'frames'");
-  return find.executeStep() ? find.getColumn(0).getString() : "";
-}
+    "NOT NULL CHECK (delay_ns >= 0), PRIMARY KEY (attempt_id, frame)) STRICT, WITHOUT ROWID"};
 
 }  // namespace
 
-bool has_frames(SQLite::Database& db, const std::string& path) {
-  const std::string found = table_of(db);
-  if (!found.empty() && found != kTable)
-    throw StoreRefused(path +
-                       ": 'frames' is not defined as palpate defines it; the file is damaged or "
-                       "was changed, restore a backup");
-  return !found.empty();
-}
+bool has_frames(SQLite::Database& db, const std::string& path) { return kFrames.is_in(db, path); }
 
 void write_frames(SQLite::Database& db, std::int64_t attempt,
                   const std::vector<FrameRecord>& frames) {
   if (frames.empty()) return;
-  if (!has_frames(db, db.getFilename())) db.exec(kTable);
+  if (!has_frames(db, db.getFilename())) db.exec(kFrames.sql);
   SQLite::Statement insert(db, "INSERT INTO frames VALUES (?, ?, ?, ?, ?)");
   std::int64_t number = 0;
   for (const FrameRecord& frame : frames) {

@@ -6,10 +6,12 @@
 
 namespace palpate::data {
 
-ParticipantGroups::ParticipantGroups(const std::vector<ProtocolInfo>& protocols) {
+ParticipantGroups::ParticipantGroups(const std::vector<ProtocolInfo>& protocols, bool unmasked) {
   for (const ProtocolInfo& protocol : protocols) {
     GroupAssignment groups = read_stored_protocol(protocol.text).groups;
-    for (const std::string& name : groups.names) {
+    if (unmasked) groups.unmask();
+    masked_ |= groups.masked();
+    for (const std::string& name : groups.listed()) {
       if (std::ranges::find(names_, name) == names_.end()) names_.push_back(name);
     }
     if (groups.any()) by_protocol_.emplace(protocol.sha256, std::move(groups));

@@ -7,6 +7,7 @@
 #include "data/store/connection.h"
 #include "data/store/protocol_rows.h"
 #include "data/store/record_columns.h"
+#include "data/store/unmaskings.h"
 
 namespace palpate::data {
 namespace {
@@ -145,6 +146,10 @@ std::optional<std::int64_t> Store::latest_recorded_time() {
     }
     return newest;
   });
+}
+
+std::vector<Unmasking> Store::unmaskings() {
+  return guarded(impl_->path, [&] { return read_unmaskings(*impl_->db, impl_->path); });
 }
 
 StoreCounts Store::counts() {

@@ -1,10 +1,12 @@
 // Sessions and runs: a session belongs to a participant; a run is the part of it shown by one
 // process, so an interrupted session has several.
 
+#include "data/base/text.h"
 #include "data/store/attempts.h"
 #include "data/store/connection.h"
 #include "data/store/protocol_rows.h"
 #include "data/store/record_columns.h"
+#include "data/store/unmaskings.h"
 
 namespace palpate::data {
 namespace {
@@ -140,6 +142,23 @@ void Store::add_note(const Run& run, std::int64_t at_ns, const std::string& text
     Binder(add) << run.id << at_ns << text;
     add.exec();
     impl_->seals->note(impl_->db->getLastInsertRowid());
+    return true;
+  });
+}
+
+void Store::unmask(const std::string& person, const std::string& program_version,
+                   std::int64_t utc_ns) {
+  constexpr std::size_t kLongest = 200;  // bytes
+  if (person.empty() || person.size() > kLongest || !is_plain_utf8(person))
+    impl_->refuse("expected the name of who unmasks the groups: 1 to " + std::to_string(kLongest) +
+                  " bytes of UTF-8 without control characters");
+  impl_->commit([&] {
+    SQLite::Statement count(*impl_->db,
+                            "SELECT count(DISTINCT s.participant_id) FROM sessions s JOIN attempts "
+                            "a ON a.session_id = s.id WHERE a.state = 'completed'");
+    count.executeStep();
+    write_unmasking(*impl_->db, impl_->path,
+                    {utc_ns, person, program_version, count.getColumn(0).getInt()});
     return true;
   });
 }

@@ -189,6 +189,10 @@ class Store {
   /// has ended, or reason is `running` or `interrupted`.
   void end_run(const Run& run, RunEnd reason, std::int64_t ended_ns);
 
+  /// Shows the names of masked groups from now on, on record. \throws StoreRefused: a name of the
+  /// person that is empty, too long or has control characters
+  void unmask(const std::string& person, const std::string& program_version, std::int64_t utc_ns);
+
   /// Withdrawal: removes all data of a participant, in all protocols. Deletes the rows with
   /// secure_delete, truncates the -wal, rebuilds the file (VACUUM) and deletes backups beside it
   /// that hold the participant. A salted hash of the code stays (forget.h), with which enrol and
@@ -218,6 +222,8 @@ class Store {
   /// clock. Used to detect a clock that was set back.
   std::optional<std::int64_t> latest_recorded_time();
   StoreCounts counts();
+  /// When masked groups were unmasked, and by whom, in the order of time; empty: they are masked.
+  std::vector<Unmasking> unmaskings();
   ParticipantSummary participant_summary(const std::string& code);
   bool has_samples(const Participant& participant, int session);
   /// Code -> onset of its first completed trial in any protocol (without one: begin of the first

@@ -177,7 +177,7 @@ Json schedule_answer(const std::string& text, const std::string& path, int parti
   const Protocol all = protocols::parse_protocol_text(text, path);
   const Protocol& protocol = protocols::protocol_of(all, participant);
   Json out{{"participant", participant}};
-  if (all.groups.any()) out["group"] = all.groups.name(participant);
+  if (all.groups.any()) out["group"] = all.groups.true_name(all.groups.group(participant));
   put_rows(out, trials_of(protocol, participant));
   return out;
 }

@@ -370,7 +370,7 @@ Json picture_answer(const std::string& text, const std::string& path) {
   Pictures pictures(kMostTriangles / protocol.stimuli.size() + 1);
   pictures.add(protocol, "");
   for (std::size_t i = 0; i < protocol.group_protocols.size(); ++i)
-    pictures.add(*protocol.group_protocols[i], protocol.groups.names[i]);
+    pictures.add(*protocol.group_protocols[i], protocol.groups.true_name(i));
   Json out{{"stimuli", pictures.all()}, {"movements", movements_of(protocol)}};
   Json& stylus = out["stylus"];
   stylus = {{"length_m", protocol.stylus.length}, {"grip_m", protocol.stylus.grip}};

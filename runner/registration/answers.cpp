@@ -60,8 +60,8 @@ std::string effect_of(const analysis::ThresholdStudy& study, const protocols::Pr
     case analysis::PlannedContrast::conditions:
       return "with the second condition the " + measure + is;
     case analysis::PlannedContrast::groups:
-      return "in group " + protocol.groups.names.back() + " the " + measure + is +
-             " than in group " + protocol.groups.names.front();
+      return "in group " + protocol.groups.true_name(protocol.groups.names.size() - 1) + " the " +
+             measure + is + " than in group " + protocol.groups.true_name(0);
     case analysis::PlannedContrast::zero:
       break;
   }

@@ -664,6 +664,24 @@ CheckPoint left_out(const char* id, const char* title, const std::string& good,
   return out;
 }
 
+/// Whether masked groups were unmasked before the last planned participant.
+CheckPoint of_masks(const Registration& registered,
+                    const std::vector<data::Unmasking>& unmaskings) {
+  CheckPoint out{"masks", "Masked groups", Finding::as_registered, "The groups are masked."};
+  const std::size_t planned = registered.order_sha256.size();
+  for (const data::Unmasking& one : unmaskings) {
+    out.sentence = "The groups were unmasked when all planned participants had trials.";
+    out.evidence.push_back(
+        data::format_utc(one.utc_ns) + ", by " + printable(one.person) + ": " +
+        counted(static_cast<std::size_t>(one.participants), "participant", "participants") +
+        " had trials, registered " + std::to_string(planned));
+    if (static_cast<std::size_t>(one.participants) < planned) out.finding = Finding::deviation;
+  }
+  if (out.finding == Finding::deviation)
+    out.sentence = "The groups were unmasked before all planned participants had trials.";
+  return out;
+}
+
 /// Compliant if the protocol allows it and all sessions or none have torque: sessions with and
 /// without torque cannot be compared.
 CheckPoint of_torque(const Registration& registered, const StudyData& study) {
@@ -834,6 +852,8 @@ StudyCheck check_study(const Registration& registered, const std::string& folder
   };
   behind("digest", protocol);
   behind("people", of_dates(registered, study));
+  if (registered.protocol.groups.masked())
+    behind("people", of_masks(registered, store.unmaskings()));
   if (!reported.json.empty())
     out.points.push_back(
         of_reported(table, reported, reported.too_fast.value_or(registered.too_fast)));

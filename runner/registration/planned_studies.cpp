@@ -524,6 +524,8 @@ std::string PlannedTasks::analyzed(std::size_t study, bool with_effect) const {
   analysis::StudyTable table;
   table.simulated = true;
   table.protocols = {{made_.protocol.name, made_.protocol.sha256}};
+  GroupAssignment groups = made_.protocol.groups;
+  groups.unmask();
   // No figure with a name depends on simulated goodness of fit, which takes most of the time.
   simulate(study, with_effect, [&](int number, const data::TrialRecord& record) {
     if (record.practice) return;
@@ -531,7 +533,7 @@ std::string PlannedTasks::analyzed(std::size_t study, bool with_effect) const {
         analysis::study_trial_of(session::simulated_code(number), record));
     trial.protocol_sha256 = made_.protocol.sha256;
     trial.participant_number = number;
-    trial.group = made_.protocol.groups.name(number);
+    trial.group = groups.name(number);
     trial.simulated = true;
   });
   const protocols::Protocol& own = made_.protocol;

@@ -612,7 +612,8 @@ class TaskAnswers final : public StudyAnswers {
       ++counts[protocol_.groups.group(number)];
     std::string out = "Groups of participants: " + study::groups_in_words(protocol_) + ". Planned:";
     for (std::size_t i = 0; i < counts.size(); ++i)
-      out += (i == 0 ? " " : ", ") + protocol_.groups.names[i] + " " + std::to_string(counts[i]);
+      out +=
+          (i == 0 ? " " : ", ") + protocol_.groups.true_name(i) + " " + std::to_string(counts[i]);
     return out +
            ". Compared by a mixed analysis of variance of the participants' values (type "
            "III), and by Welch's t.";

@@ -339,7 +339,7 @@ class SimulatedGroups {
     };
     if (!groups_.any()) add(protocol, "");
     for (std::size_t i = 0; i < protocol.group_protocols.size(); ++i)
-      add(*protocol.group_protocols[i], groups_.names[i]);
+      add(*protocol.group_protocols[i], groups_.true_name(i));
   }
   const SimulatedStudy& study_of(int participant_number) const {
     return *studies_[groups_.group(participant_number)];

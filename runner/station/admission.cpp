@@ -176,6 +176,7 @@ namespace fs = std::filesystem;
 struct Known {
   std::vector<std::string> codes;          ///< in the order they came
   bool enrolled = false;                   ///< the code, in this protocol
+  bool unmasked = false;                   ///< masked groups have their names
   std::optional<EarlierProtocol> earlier;  ///< of the code, where it is not enrolled in this one
   std::vector<std::string> others;  ///< differences from protocols of the same name, in words
   std::optional<int> number;        ///< for a new participant, if texts changed
@@ -254,6 +255,7 @@ Known look_into(const RunSettings& settings, const protocols::Protocol& protocol
     known.enrolled = known.enrolled || one.code == code;
   known.newest_ns = store.latest_recorded_time();
   if (protocol.groups.any()) known.groups = facts_of_groups(store, protocol);
+  known.unmasked = !store.unmaskings().empty();
   for (const data::ProtocolInfo& info : store.protocols()) {
     for (const data::Participant& one : store.participants(info.sha256)) {
       if (one.code == code) known.numbers[info.sha256] = one.enrolled_number;
@@ -343,6 +345,7 @@ void check_clock(const RunSettings& settings, const Known& known, Admission& adm
 void join_group(const RunSettings& settings, const Known& known, Admission& admission) {
   admission.shown = session::info_of(admission.protocol);
   GroupFacts facts = known.groups;
+  if (known.unmasked) admission.protocol.groups.unmask();
   const GroupAssignment& groups = admission.protocol.groups;
   facts.completed.resize(groups.names.size());
   if (const auto number = known.numbers.find(admission.enrolled.sha256);

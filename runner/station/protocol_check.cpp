@@ -143,8 +143,12 @@ Json summary_json(const protocols::Protocol& protocol) {
     }
   }
   out["trials"] = trials;
-  if (protocol.groups.any())
-    out["groups"] = {{"names", protocol.groups.names}, {"assign", to_string(protocol.groups.rule)}};
+  if (protocol.groups.any()) {
+    GroupAssignment groups = protocol.groups;
+    groups.unmask();
+    out["groups"] = {{"names", groups.names}, {"assign", to_string(groups.rule)}};
+    if (protocol.groups.masked()) out["groups"]["masked_as"] = protocol.groups.listed();
+  }
   out["seed"] = protocol.seed;
   out["sha256"] = protocol.sha256;
   return out;
@@ -312,13 +316,13 @@ Json protocol_json(const std::string& file, const protocols::Protocol& protocol,
   if (!protocol.groups.any()) add(protocol, library, "");
   for (std::size_t i = 0; i < protocol.group_protocols.size(); ++i) {
     const protocols::Protocol& group = *protocol.group_protocols[i];
-    add(group, StimulusLibrary(group), protocol.groups.names[i]);
+    add(group, StimulusLibrary(group), protocol.groups.true_name(i));
   }
   Duration duration = duration_of(protocol);
   for (std::size_t i = 0; i < protocol.group_protocols.size(); ++i) {
     const protocols::Protocol& group = *protocol.group_protocols[i];
     const Duration own = duration_of(group);
-    out["groups"].push_back({{"name", protocol.groups.names[i]},
+    out["groups"].push_back({{"name", protocol.groups.true_name(i)},
                              {"summary", summary_json(group)},
                              {"duration_s", own.usual},
                              {"longest_s", own.longest}});

@@ -21,13 +21,15 @@ session::LimitedForSimulation fit_to_simulation(protocols::Protocol& protocol,
              shown, StimulusLibrary(shown), participants::settings_of_group(simulated, group)))
       reasons += "\n" + (group.empty() ? "" : "group '" + group + "': ") + fault;
   };
+  GroupAssignment groups = protocol.groups;
+  groups.unmask();
   for (const auto& [name, own] : simulated.groups) {
-    if (protocol.groups.find(name) == protocol.groups.names.size())
+    if (groups.find(name) == groups.names.size())
       reasons += "\nthe settings have a group '" + name + "', the protocol has none of that name";
   }
   if (!protocol.groups.any()) add_reasons(protocol, "");
   for (std::size_t i = 0; i < protocol.group_protocols.size(); ++i)
-    add_reasons(*protocol.group_protocols[i], protocol.groups.names[i]);
+    add_reasons(*protocol.group_protocols[i], groups.names[i]);
   if (!reasons.empty()) throw UsageError("this protocol cannot be simulated:" + reasons);
   return limited;
 }

@@ -371,10 +371,16 @@ std::string task_schedule_text(const protocols::Protocol& protocol, int particip
 }
 
 std::string groups_in_words(const protocols::Protocol& protocol) {
-  const GroupAssignment& groups = protocol.groups;
+  GroupAssignment groups = protocol.groups;
   if (!groups.any()) return "";
-  std::string names;
-  for (const std::string& name : groups.names) names += (names.empty() ? "" : ", ") + name;
+  const auto listed = [](const std::vector<std::string>& all) {
+    std::string out;
+    for (const std::string& name : all) out += (out.empty() ? "" : ", ") + name;
+    return out;
+  };
+  const std::string masks = groups.masked() ? " (masked as " + listed(groups.listed()) + ")" : "";
+  groups.unmask();
+  const std::string names = listed(groups.names) + masks;
   switch (groups.rule) {
     case GroupAssignment::Rule::balanced:
       return names + ": in turn by participant number";

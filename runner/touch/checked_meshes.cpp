@@ -47,7 +47,7 @@ std::vector<protocols::Fault> mesh_faults(const protocols::Protocol& protocol,
     const std::vector<protocols::StimulusSpec>& stimuli = protocol.group_protocols[g]->stimuli;
     for (std::size_t i = 0; i < stimuli.size() && faults.empty(); ++i)
       check_meshes(stimuli[i].object,
-                   "/groups/patch/" + protocol.groups.names[g] + "/stimuli/" +
+                   "/groups/patch/" + protocol.groups.true_name(g) + "/stimuli/" +
                        std::to_string(stimuli[i].place),
                    file, builder, faults);
   }

@@ -62,6 +62,7 @@ int serve_command(const std::vector<std::string>& args);
 int simulate_command(const std::vector<std::string>& args);
 int stability_command(const std::vector<std::string>& args);
 int sweep_command(const std::vector<std::string>& args);
+int unmask_command(const std::vector<std::string>& args);
 int validate_command(const std::vector<std::string>& args);
 int watch_command(const std::vector<std::string>& args);
 

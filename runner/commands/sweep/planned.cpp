@@ -384,6 +384,8 @@ std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
   row.order_seed = study.order_seed;
   try {
     protocols::Protocol protocol = sweep.study.parse(study.protocol);
+    GroupAssignment groups = protocol.groups;
+    groups.unmask();
     const participants::SimulatedSettings settings =
         participants::read_simulated_settings(study.settings.dump());
     session::limit_for_simulation(protocol, settings);
@@ -397,7 +399,7 @@ std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
           if (record.practice) return;
           tasks.trials.push_back(
               analysis::study_trial_of(session::simulated_code(participant), record));
-          tasks.trials.back().group = protocol.groups.name(participant);
+          tasks.trials.back().group = groups.name(participant);
         });
     if (!done) return std::nullopt;
     row.figures = has_blocks ? task_figures_of(sweep.plan, tasks) : trials.figures();

@@ -318,7 +318,7 @@ void print_protocol(const protocols::Protocol& protocol, SceneBuilder builder,
   if (!protocol.groups.any()) print_fitness(protocol, library, measured, out);
   for (std::size_t i = 0; i < protocol.group_protocols.size(); ++i) {
     const protocols::Protocol& group = *protocol.group_protocols[i];
-    out << "group " << protocol.groups.names[i] << "\n";
+    out << "group " << protocol.groups.true_name(i) << "\n";
     print_task_summary(group, out);
     print_fitness(group, StimulusLibrary(group), measured, out);
   }

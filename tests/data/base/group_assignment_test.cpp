@@ -14,7 +14,7 @@ namespace {
 using Rule = GroupAssignment::Rule;
 
 GroupAssignment groups_of(std::size_t count, Rule rule, int block = 2, std::uint64_t seed = 7) {
-  GroupAssignment out{{}, rule, block, seed};
+  GroupAssignment out{.rule = rule, .block = block, .seed = seed};
   for (std::size_t i = 0; i < count; ++i) out.names.push_back("g" + std::to_string(i));
   return out;
 }
@@ -74,6 +74,28 @@ TEST(GroupAssignment, NumbersAreFoundAgain) {
     for (int n = 1; n <= 500; ++n)
       ASSERT_EQ(groups.number(groups.group(n), groups.row(n)), n) << to_string(rule);
   }
+}
+
+TEST(GroupAssignment, MasksFollowTheSeed) {
+  std::set<std::vector<std::string>> orders;
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
+    GroupAssignment groups = groups_of(3, Rule::blocked, 2, seed);
+    const GroupAssignment open = groups;
+    groups.mask();
+    EXPECT_EQ(groups.listed(), (std::vector<std::string>{"A", "B", "C"}));
+    orders.insert(groups.names);
+    for (int number = 1; number <= 20; ++number) {
+      EXPECT_EQ(groups.group(number), open.group(number));
+      EXPECT_EQ(groups.true_name(groups.find(groups.name(number))), open.name(number));
+    }
+    const std::vector<std::string> masks = groups.names;
+    groups.mask();
+    EXPECT_EQ(groups.names, masks);
+    groups.unmask();
+    groups.unmask();
+    EXPECT_EQ(groups.names, open.names);
+  }
+  EXPECT_EQ(orders.size(), 6U);
 }
 
 TEST(GroupAssignment, NamesAreFound) {

@@ -83,6 +83,35 @@ TEST(Groups, DrawsAreThoseOfTheNumber) {
   }
 }
 
+TEST(Groups, MaskedGroupsKeepTheirPatches) {
+  nlohmann::json study = with_groups("blocked");
+  study["groups"]["masked"] = true;
+  const Protocol all = parsed(study);
+  EXPECT_EQ(all.groups.listed(), (std::vector<std::string>{"A", "B"}));
+  for (int number = 1; number <= 8; ++number)
+    EXPECT_EQ(protocol_of(all, number).samples,
+              all.groups.true_name(all.groups.group(number)) == "old");
+  study["groups"]["patch"]["old"]["renderers"] = {"line"};
+  const std::vector<Fault> faults =
+      faults_when([&] { parse_protocol_text(study.dump(), "study.json"); });
+  ASSERT_FALSE(faults.empty());
+  EXPECT_EQ(faults[0].location, "/groups/patch/old/renderers/0");
+}
+
+TEST(Groups, MasksThatTellAreRefused) {
+  nlohmann::json given = with_groups("given"), letter = with_groups("balanced");
+  given["groups"]["masked"] = letter["groups"]["masked"] = true;
+  letter["groups"]["names"][1] = "B";
+  letter["groups"].erase("patch");
+  for (const auto& [study, place] :
+       {std::pair(given, "/groups/masked"), {letter, "/groups/names/1"}}) {
+    const std::vector<Fault> faults =
+        faults_when([&] { parse_protocol_text(study.dump(), "study.json"); });
+    ASSERT_EQ(faults.size(), 1U);
+    EXPECT_EQ(faults[0].location, place);
+  }
+}
+
 TEST(Groups, FaultsNameTheGroup) {
   nlohmann::json study = with_groups("balanced");
   study["groups"]["patch"]["old"]["renderers"] = {"line"};

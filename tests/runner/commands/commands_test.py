@@ -18,7 +18,7 @@ import unittest
 from command_case import PALPATE, CommandCase
 
 PROTOCOLS = pathlib.Path(sys.argv[1])
-COMMANDS = ["accuracy", "analyze", "bench", "bundle", "check", "cluster", "devices", "export", "forget", "merge", "plan", "register", "render", "replay", "run", "schedule", "simulate", "stability", "sweep", "validate", "watch"]
+COMMANDS = ["accuracy", "analyze", "bench", "bundle", "check", "cluster", "devices", "export", "forget", "merge", "plan", "register", "render", "replay", "run", "schedule", "simulate", "stability", "sweep", "unmask", "validate", "watch"]
 
 
 class Words(CommandCase):

@@ -3,6 +3,7 @@
 import csv
 import json
 import pathlib
+import re
 import sqlite3
 import subprocess
 import sys
@@ -172,6 +173,87 @@ class Groups(command_case.CommandCase):
         registered.write_text(registered.read_text().replace('"given"', '"balanced"'))
         points(self.dir / "study.db", status=1)
         self.assertIn("whose numbers the protocol gives in turn", (self.dir / "check.json").read_text())
+
+    def masked(self, **changes):
+        return self.grouped(assign="blocked", masked=True, **changes)
+
+    def test_masked_groups_are_letters_until_unmasked(self):
+        protocol = self.masked()
+        db = self.simulated(protocol, "--participants", 8)
+        letters = {row["participant_id"]: row["group"] for row in self.exported(db)[1]}
+        self.assertEqual(sorted(letters.values()), ["A"] * 4 + ["B"] * 4)
+        self.palpate("export", "--db", db, "--format", "bids", "--out", self.dir / "bids")
+        self.palpate("export", "--db", db, "--format", "psych-ds", "--out", self.dir / "psychds")
+        said = self.palpate("schedule", protocol, "--participant", 1).stdout + self.palpate("analyze", "--db", db, "--report", self.dir / "r.html").stdout
+        self.assertIn("participant 1, group " + letters["S001"], said)
+        self.assertIn("by group (A 4, B 4)", said)
+        # Only copies of the protocol, of which sidecars have one, have the names.
+        written = {"said": said, "report": (self.dir / "r.html").read_text().partition("<main")[2]}
+        for file in [*(self.dir / "bids").rglob("*.tsv"), *(self.dir / "psychds").rglob("*.csv"), self.dir / "bids" / "participants.json"]:
+            written[file] = file.read_text()
+        self.assertGreater(len(written), 10)
+        self.assertEqual([where for where, text in written.items() if re.search(r"\b(young|old)\b", text)], [])
+        masked = self.analyzed("--db", db)
+        self.assertEqual(masked["effects"], self.analyzed("--csv", self.dir / "study.csv", "--design", protocol)["effects"])
+
+        self.palpate("run", protocol, "--db", self.dir / "none.db", "--participant", "P1", "--group", "A", "--device", "simulated", status=2)
+        done = self.palpate("unmask", "--db", db, "--by", "M. Curie")
+        self.assertRegex(done.stdout, "by M. Curie, when 8 participants had trials")
+        self.assertEqual(self.palpate("unmask", "--db", db, "--by", "P. Curie").stdout, done.stdout, "the first one counts")
+        names = {row["participant_id"]: row["group"] for row in self.exported(db)[1]}
+        self.assertEqual(sorted(names.values()), ["old"] * 4 + ["young"] * 4)
+        self.assertEqual(len(set(zip(letters.values(), names.values()))), 2, "a letter stands for a group")
+        for letter, name in set(zip(letters.values(), names.values())):
+            self.assertIn(f"  {letter}  {name}, 4 participants\n", done.stdout)
+        open_ = self.analyzed("--db", db)
+        self.assertEqual(open_["effects"], masked["effects"])
+        self.assertEqual(open_["design"]["groups"], ["young", "old"])
+        self.assertEqual(open_["effects"], self.analyzed("--csv", self.dir / "study.csv", "--design", protocol)["effects"])
+
+    def test_parts_of_masked_studies_merge(self):
+        protocol = self.masked()
+        for part in ("1/2", "2/2"):
+            self.simulated(protocol, "--participants", 4, "--shard", part, name=f"{part[0]}.db")
+        merged = [self.dir / "m1.db", self.dir / "m2.db"]
+        self.palpate("merge", "--out", merged[0], self.dir / "1.db", self.dir / "2.db")
+        self.assertEqual({row["group"] for row in self.exported(merged[0])[1]}, {"A", "B"})
+        self.palpate("unmask", "--db", self.dir / "2.db", "--by", "me")
+        self.palpate("merge", "--out", merged[1], self.dir / "2.db", self.dir / "1.db")
+        self.assertEqual({row["group"] for row in self.exported(merged[1])[1]}, {"young", "old"})
+        self.assertIn("by me, when 2 participants had trials", self.palpate("unmask", "--db", merged[1]).stdout)
+
+    def test_unmasking_without_masks_is_refused(self):
+        db = self.simulated(self.grouped(), "--groups", "young=1,old=1")
+        self.assertIn("no protocol of it has masked groups", self.palpate("unmask", "--db", db, status=2).stderr)
+        self.assertIn("there is no such file", self.palpate("unmask", "--db", self.dir / "none.db", status=2).stderr)
+        self.assertFalse((self.dir / "none.db").exists())
+        db = self.simulated(self.masked(), "--participants", 2, name="m.db")
+        self.assertIn("expected the name of who unmasks", self.palpate("unmask", "--db", db, "--by", "a\nb", status=2).stderr)
+        with sqlite3.connect(db) as changed:
+            changed.execute("CREATE TABLE unmaskings (x)")
+        self.assertIn("'unmaskings' is not defined as palpate defines it", self.palpate("unmask", "--db", db, status=2).stderr)
+
+    def test_a_check_tells_who_unmasked(self):
+        protocol = self.masked()
+        self.palpate("plan", "--exponent-effect", 20, "--trials", 3, "--participants", "4-8", "--studies", 100, "--json", self.dir / "plan.json")
+        hypotheses = self.file("h.json", [{"id": "H1", "text": "Older people say more.",
+                                           "corroborated": "effects.exponent.a.group.p < alpha", "refuted": "effects.exponent.a.group.p > 0.5"}])
+        out = self.dir / "registration"
+        self.palpate("register", protocol, "--plan", self.dir / "plan.json", "--hypotheses", hypotheses, "--studies", 20, "--out", out, "--participants", 4)
+        self.assertIn("young, old (masked as A, B)", (out / "registration.md").read_text())
+        db = self.simulated(protocol, "--participants", 2)
+
+        def masks(status):
+            self.palpate("check", out, "--db", db, "--json", self.dir / "check.json", "--force", status=status)
+            return next(one for one in json.loads((self.dir / "check.json").read_text())["points"] if one["id"] == "masks")
+        self.assertEqual(masks(1)["sentence"], "The groups are masked.")
+        for name, n, finding in (("late", 4, "as registered"), ("early", 2, "deviation")):
+            db = self.simulated(protocol, "--participants", n, name=f"{name}.db")
+            self.palpate("unmask", "--db", db, "--by", "me")
+            self.simulated(protocol, "--participants", 4, name=f"{name}.db")
+            found = masks(1 if n == 2 else 0)
+            self.assertEqual(found["finding"].replace("_", " "), finding)
+            self.assertIn(f"by me: {n} participants had trials, registered 4", found["evidence"][0])
 
     def test_options_that_contradict_are_refused(self):
         protocol = self.grouped()
