@@ -123,7 +123,7 @@ PUBLIC = {
     "data/base": "cell_name checksum column_names group_assignment input_file json_text markdown random sobol text",
     "data": "column_table record stored_protocol sweep_record",
     "data/files": "atomic_file atomic_folder file_permissions text_sink output_check utc",
-    "data/store": "export_log frames participant_columns participant_groups protocol_rows schema connection station_database store sweep_file "
+    "data/store": "export_log frames unmaskings participant_columns participant_groups protocol_rows schema connection station_database store sweep_file "
                   "forget task_text",
     "data/export": "csv datasets sample_slots settings study_about delimited_row",
     "data/merge": "merge",
