@@ -92,28 +92,53 @@ GroupJson contrast_json(const GroupedMeasure& of, const GroupContrast& one) {
   return out;
 }
 
-GroupJson model_json(const GroupedMeasure& of, const GroupedMixedModel& model) {
-  GroupJson out{{"formula",
-                 "log(response_time) ~ group * renderer * shape + (1 + renderer | "
-                 "participant)"},
+/// "log(response_time) ~ group * renderer * shape + (1 + renderer | participant)"
+std::string formula_of(const GroupedMeasure& of, const DesignModel& model) {
+  std::string fixed = of.groups.empty() ? "" : "group", random = "1";
+  for (const StudyFactor& factor : of.within) {
+    if (factor.levels.size() > 1) fixed += (fixed.empty() ? "" : " * ") + factor.name;
+  }
+  for (const std::string& slope : model.slopes) random += " + " + slope;
+  return "log(response_time) ~ " + fixed + " + (" + random + " | participant)";
+}
+
+GroupJson model_effect_json(const GroupEffect& effect) {
+  GroupJson out{{"num_df", number_json(effect.num_df)},
+                {"den_df", number_json(effect.den_df)},
+                {"f", number_json(effect.f)},
+                {"p", number_json(effect.p)},
+                {"p_holm", number_json(effect.p_holm)}};
+  if (!effect.undefined.empty()) out["reason"] = effect.undefined;
+  return out;
+}
+
+GroupJson model_json(const GroupedMeasure& of, const DesignModel& model) {
+  GroupJson out{{"formula", formula_of(of, model)},
                 {"n_observations", model.n_observations},
-                {"n_participants", model.n_participants}};
+                {"n_participants", model.n_participants},
+                {"slopes_taken_out", model.taken_out}};
   if (!model.undefined.empty()) out["reason"] = model.undefined;
   if (!model.singular.empty()) out["singular"] = model.singular;
   out["effects"] = GroupJson::object();
   for (const GroupEffect& effect : model.effects)
-    out["effects"][effect.name] = {{"num_df", number_json(effect.num_df)},
-                                   {"den_df", number_json(effect.den_df)},
-                                   {"f", number_json(effect.f)},
-                                   {"p", number_json(effect.p)}};
+    out["effects"][effect.name] = model_effect_json(effect);
   out["means"] = GroupJson::array();
-  for (const ModelMean& one : model.means)
-    out["means"].push_back({{"group", of.groups[one.group]},
-                            {"renderer", renderers_of(of)[one.renderer]},
-                            {"estimate", number_json(one.value.estimate)},
-                            {"se", number_json(one.value.se)},
-                            {"df", number_json(one.value.df_satterthwaite)},
-                            {"ci95", interval_json(one.value.ci95)}});
+  for (const ModelMean& one : model.means) {
+    GroupJson& mean = out["means"].emplace_back();
+    mean["group"] = group_json(of, one.group);
+    put_condition(of, one.condition, mean);
+    mean["estimate"] = number_json(one.value.estimate);
+    mean["se"] = number_json(one.value.se);
+    mean["df"] = number_json(one.value.df_satterthwaite);
+    mean["ci95"] = interval_json(one.value.ci95);
+  }
+  out["contrasts"] = GroupJson::array();
+  for (const GroupContrast& one : model.contrasts) {
+    GroupJson contrast = contrast_json(of, one);
+    contrast.erase("n_reference");
+    contrast.erase("n");
+    out["contrasts"].push_back(std::move(contrast));
+  }
   return out;
 }
 
@@ -296,21 +321,33 @@ Table group_effects_table(const GroupedMeasure& of, const std::string& label) {
   return out;
 }
 
+/// What the mixed model is, and what was taken out of it.
+std::vector<std::string> model_notes(const GroupedMeasure& of) {
+  const DesignModel& model = *of.model;
+  std::vector<std::string> out{printable(formula_of(of, model)) +
+                               ", REML, type III, degrees of freedom by Satterthwaite."};
+  std::string names;
+  for (const std::string& one : model.taken_out)
+    names += (names.empty() ? "" : ", ") + printable(one);
+  if (!names.empty())
+    out.push_back("Participants' slopes that the data cannot tell were taken out, in this order: " +
+                  names + ".");
+  if (!model.singular.empty()) out.push_back("Singular: " + model.singular + ".");
+  return out;
+}
+
 /// The mixed model's effects; without rows if there is none.
 Table group_model_table(const GroupedMeasure& of, const std::string& label) {
   Table out;
   out.caption = group_caption(title_of(of) + ": linear mixed model of single trials", label);
-  out.header = {"Effect", "df", "F", "p"};
+  out.header = {"Effect", "df", "F", "p", "p (Holm)"};
   if (!of.model) return out;
   for (const GroupEffect& one : of.model->effects) {
     out.rows.push_back(
         {one.name, one.num_df ? short_number(*one.num_df) + ", " + fixed(*one.den_df, 1) : kMissing,
-         number(one.f, 2), p_or_missing(one.p)});
+         number(one.f, 2), p_or_missing(one.p), p_or_missing(one.p_holm)});
   }
-  if (!of.model->singular.empty()) out.notes.push_back("Singular: " + of.model->singular + ".");
-  out.notes.emplace_back(
-      "log(response_time) ~ group * renderer * shape + (1 + renderer | participant), REML, type "
-      "III, degrees of freedom by Satterthwaite.");
+  out.notes = model_notes(of);
   return out;
 }
 
@@ -397,6 +434,9 @@ void put_design(const StudyTable& table, const std::vector<GroupedMeasure>& meas
     if (several) place = &(*place)[one.shape];
     for (const GroupEffect& effect : one.result.anova.effects)
       (*place)[effect.name] = group_effect_json(effect);
+    for (std::size_t i = 0; one.model && i < one.model->effects.size(); ++i)
+      out["model_effects"][one.measure][one.model->effects[i].name] =
+          model_effect_json(one.model->effects[i]);
   }
 }
 
@@ -412,7 +452,10 @@ std::string design_text(const std::vector<GroupedMeasure>& measures) {
     }
     for (const GroupEffect& effect : one.result.anova.effects)
       text += "  " + effect.name + ": " + f_test_text(effect) + "\n";
-    if (one.model && !one.model->effects.empty()) text += "  mixed model of single trials\n";
+    if (one.model && !one.model->effects.empty()) {
+      text += "  mixed model of single trials\n";
+      for (const std::string& note : model_notes(one)) text += "    " + note + "\n";
+    }
     for (std::size_t i = 0; one.model && i < one.model->effects.size(); ++i)
       text +=
           "    " + one.model->effects[i].name + ": " + f_test_text(one.model->effects[i]) + "\n";

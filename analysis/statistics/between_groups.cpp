@@ -49,14 +49,6 @@ GroupMarginal marginal(const std::vector<double>& values) {
   return out;
 }
 
-/// Adjusts the p of the contrasts from `first` on.
-void adjust_contrasts(std::vector<GroupContrast>& contrasts, std::size_t first) {
-  std::vector<std::optional<double>> p;
-  for (std::size_t i = first; i < contrasts.size(); ++i) p.push_back(contrasts[i].p);
-  const auto adjusted = holm(p);
-  for (std::size_t i = first; i < contrasts.size(); ++i) contrasts[i].p_holm = adjusted[i - first];
-}
-
 /// One-sample t of the participants' differences.
 GroupContrast paired_contrast(const std::vector<double>& differences, double noise) {
   GroupContrast out;
@@ -81,6 +73,25 @@ GroupContrast paired_contrast(const std::vector<double>& differences, double noi
 }
 
 }  // namespace
+
+ComparedConditions compared_conditions(const std::vector<WithinFactor>& within, std::size_t shown) {
+  ComparedConditions out{{std::nullopt}, {}};
+  for (std::size_t f = 0; f < std::min(shown, within.size()); ++f) {
+    if (within[f].levels < 2) continue;
+    for (std::size_t level = 0; level < within[f].levels; ++level) {
+      out.means.emplace_back(DesignCondition{f, level});
+      if (level > 0) out.differences.push_back({f, level});
+    }
+  }
+  return out;
+}
+
+void adjust_contrasts(std::vector<GroupContrast>& contrasts, std::size_t first) {
+  std::vector<std::optional<double>> p;
+  for (std::size_t i = first; i < contrasts.size(); ++i) p.push_back(contrasts[i].p);
+  const auto adjusted = holm(p);
+  for (std::size_t i = first; i < contrasts.size(); ++i) contrasts[i].p_holm = adjusted[i - first];
+}
 
 GroupContrast welch(const std::vector<double>& reference, const std::vector<double>& other,
                     double noise) {
@@ -147,16 +158,13 @@ BetweenGroups compare_groups(const std::vector<GroupedFigures>& figures, std::si
   }
   out.anova = mixed_anova(rows, groups, within);
   const double noise = figure_noise(rows);
-  std::vector<Compared> compared{{}}, differences;
   // Shapes are described by themselves: one table for each would hide the design.
-  const std::size_t shown = contrasts == WithinContrasts::added ? within.size() : 1;
-  for (std::size_t f = 0; f < std::min(shown, within.size()); ++f) {
-    if (within[f].levels < 2) continue;
-    for (std::size_t level = 0; level < within[f].levels; ++level) {
-      compared.push_back({DesignCondition{f, level}, false});
-      if (level > 0) differences.push_back({DesignCondition{f, level}, true});
-    }
-  }
+  const ComparedConditions conditions =
+      compared_conditions(within, contrasts == WithinContrasts::added ? within.size() : 1);
+  std::vector<Compared> compared, differences;
+  for (const auto& condition : conditions.means) compared.push_back({condition, false});
+  for (const DesignCondition& condition : conditions.differences)
+    differences.push_back({condition, true});
   for (std::size_t group = 0; group < groups; ++group) {
     for (const Compared& one : compared) {
       GroupMarginal& made =

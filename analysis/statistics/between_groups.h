@@ -59,6 +59,19 @@ struct BetweenGroups {
 
 enum class WithinContrasts { left_out, added };
 
+/// What is compared: the mean over all cells, that under each level of some factors, and the
+/// differences of these from that under the first level.
+struct ComparedConditions {
+  std::vector<std::optional<DesignCondition>> means;
+  std::vector<DesignCondition> differences;
+};
+
+/// \param shown  of the first that many factors
+ComparedConditions compared_conditions(const std::vector<WithinFactor>& within, std::size_t shown);
+
+/// Sets the p_holm of the contrasts from `first` on, over these.
+void adjust_contrasts(std::vector<GroupContrast>& contrasts, std::size_t first);
+
 /// \param groups  number of groups; 1: none
 BetweenGroups compare_groups(const std::vector<GroupedFigures>& figures, std::size_t groups,
                              const std::vector<WithinFactor>& within,

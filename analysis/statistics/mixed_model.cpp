@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "analysis/statistics/anova.h"
+#include "analysis/statistics/model_tester.h"
 #include "analysis/statistics/reml.h"
 
 namespace palpate::analysis {
@@ -200,70 +201,6 @@ Columns treatment_columns(const ModelCells& cells, const std::vector<std::string
   return out;
 }
 
-/// Pseudo-inverse of the full Hessian: without directions of zero curvature.
-MatrixXd inverse_of_curved(const MatrixXd& hessian) {
-  const VectorXd scale =
-      hessian.diagonal().unaryExpr([](double d) { return d > 0 ? 1 / std::sqrt(d) : 0.0; });
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(scale.asDiagonal() * hessian *
-                                                      scale.asDiagonal());
-  const VectorXd inverse =
-      eigen.eigenvalues().unaryExpr([](double e) { return e > 1e-10 ? 1 / e : 0.0; });
-  return scale.asDiagonal() * eigen.eigenvectors() * inverse.asDiagonal() *
-         eigen.eigenvectors().transpose() * scale.asDiagonal();
-}
-
-/// Estimates and tests linear combinations of the cell means.
-class Tester {
- public:
-  Tester(const ReducedModel& data, const RemlPoint& point)
-      : data_(data),
-        point_(point),
-        means_(data.cell_means(point.beta)),
-        spread_(2 * inverse_of_curved(point.full_hessian)) {}
-
-  /// Degrees of freedom of Satterthwaite (1946) as in lmerTest (Kuznetsova et al. 2017): 2 v^2 /
-  /// var(v), with var(v) by the delta method from the Hessian of the deviance in (theta, sigma).
-  ModelEstimate operator()(const VectorXd& weights) const {
-    ModelEstimate out;
-    out.estimate = weights.dot(means_);
-    const ReducedModel::Loading load = data_.load(weights);
-    const VectorXd loaded = point_.inverse_xx * load.inside;
-    const double variance = point_.sigma_squared * (load.inside.dot(loaded) + load.outside);
-    out.se = std::sqrt(variance);
-    const auto n_theta = static_cast<Index>(point_.information_loss.size());
-    VectorXd slope(n_theta + 1);
-    for (Index k = 0; k < n_theta; ++k) {
-      slope(k) = point_.sigma_squared *
-                 loaded.dot(point_.information_loss[static_cast<std::size_t>(k)] * loaded);
-    }
-    slope(n_theta) = 2 * variance / std::sqrt(point_.sigma_squared);
-    const double df = 2 * variance * variance / slope.dot(spread_ * slope);
-    namespace bm = boost::math;
-    using Gentle = bm::policies::policy<bm::policies::overflow_error<bm::policies::ignore_error>>;
-    if (!(df > 0) || !std::isfinite(df)) {
-      out.undefined = "Satterthwaite's degrees of freedom cannot be computed";
-      return out;
-    }
-    out.df_satterthwaite = df;
-    const bm::students_t_distribution<double, Gentle> distribution(df);
-    const double half = *out.se * quantile(distribution, 0.975);
-    if (!std::isfinite(half)) {
-      out.undefined = "too few degrees of freedom";
-      return out;
-    }
-    out.t = *out.estimate / *out.se;
-    out.p = std::min(1.0, 2 * cdf(complement(distribution, std::fabs(*out.t))));
-    out.ci95 = Interval{*out.estimate - half, *out.estimate + half};
-    return out;
-  }
-
- private:
-  const ReducedModel& data_;
-  const RemlPoint& point_;
-  VectorXd means_;
-  MatrixXd spread_;
-};
-
 void put_variances(const RemlOptimum& optimum, const std::vector<std::string>& renderers,
                    MixedModel& out) {
   constexpr double kZero = 1e-4;  // relative to the residual sd, as lme4's isSingular()
@@ -338,61 +275,6 @@ MatrixXd random_coding(std::size_t renderers) {
       MatrixXd::Identity(static_cast<Index>(renderers), static_cast<Index>(renderers));
   coding.col(0).setOnes();
   return coding;
-}
-
-/// The cells of each group as shapes of their own, so that the fixed effects are those of group,
-/// renderer and shape.
-ParticipantCells cells_by_group(const ParticipantCells& all,
-                                const std::vector<std::size_t>& group_of, std::size_t groups) {
-  ParticipantCells out(all.size());
-  for (std::size_t r = 0; r < all.size(); ++r) {
-    for (std::size_t group = 0; group < groups; ++group) {
-      for (const std::vector<ParticipantCell>& shape : all[r]) {
-        std::vector<ParticipantCell>& own = out[r].emplace_back(shape);
-        for (std::size_t p = 0; p < own.size(); ++p) {
-          if (group_of[p] != group) own[p] = {};
-        }
-      }
-    }
-  }
-  return out;
-}
-
-/// F test that combinations of cell means are 0, one a row.
-GroupEffect joint_test(const Tester& tested, const MatrixXd& rows, std::string name) {
-  GroupEffect out;
-  out.name = std::move(name);
-  const Index q = rows.rows();
-  const auto variance = [&](const VectorXd& weights) {
-    const double se = tested(weights).se.value_or(0);
-    return se * se;
-  };
-  MatrixXd spread(q, q);
-  for (Index i = 0; i < q; ++i) {
-    for (Index j = 0; j <= i; ++j) {
-      const VectorXd a = rows.row(i).transpose(), b = rows.row(j).transpose();
-      spread(i, j) = spread(j, i) = i == j ? variance(a) : (variance(a + b) - variance(a - b)) / 4;
-    }
-  }
-  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(spread);
-  double sum = 0, excess = 0, least = HUGE_VAL, most = 0;
-  for (Index i = 0; i < q; ++i) {
-    const ModelEstimate one = tested(rows.transpose() * eigen.eigenvectors().col(i));
-    if (!one.t) {
-      out.undefined = one.undefined;
-      return out;
-    }
-    sum += *one.t * *one.t;
-    excess += *one.df_satterthwaite / (*one.df_satterthwaite - 2);
-    least = std::min(least, *one.df_satterthwaite);
-    most = std::max(most, *one.df_satterthwaite);
-  }
-  const auto df = static_cast<double>(q);
-  out.num_df = df;
-  out.den_df = most - least < 1e-8 * most ? most : least <= 2 ? 2 : 2 * excess / (excess - df);
-  out.f = sum / df;
-  out.p = f_upper_tail(*out.f, df, *out.den_df);
-  return out;
 }
 
 }  // namespace
@@ -493,7 +375,7 @@ MixedModel mixed_model(const ParticipantCells& participant_cells,
   out.left_out = columns.left_out;
   put_variances(optimum, renderers, out);
 
-  const Tester tested(prepared, optimum.point);
+  const ModelTester tested(prepared, optimum.point);
   for (Index i = 0; i < cells.n; ++i) {
     out.fixed_effects.push_back(
         {columns.names[static_cast<std::size_t>(i)], tested(from_cells.row(i).transpose())});
@@ -517,77 +399,6 @@ MixedModel mixed_model(const ParticipantCells& participant_cells,
   std::size_t test = 0;
   for (auto& contrasts : out.contrasts) {
     for (ModelEstimate& contrast : contrasts) contrast.p_holm = adjusted[test++];
-  }
-  return out;
-}
-
-GroupedMixedModel grouped_mixed_model(const ParticipantCells& participant_cells,
-                                      const std::vector<std::string>& renderers,
-                                      const std::vector<std::size_t>& group_of,
-                                      std::size_t groups) {
-  GroupedMixedModel out;
-  const std::size_t shapes = participant_cells.empty() ? 0 : participant_cells.front().size();
-  const ParticipantCells own = cells_by_group(participant_cells, group_of, groups);
-  const ModelCells cells = model_cells(own);
-  for (const auto& renderer : own) {
-    for (const auto& shape : renderer) {
-      for (const ParticipantCell& cell : shape) out.n_observations += cell.n_used;
-    }
-  }
-  out.undefined = why_no_fit(own, cells);
-  if (out.undefined.empty() && cells.n != static_cast<Index>(own.size() * groups * shapes))
-    out.undefined = "a cell of group, renderer and shape has no time";
-  if (!out.undefined.empty()) return out;
-  const ReducedModel prepared(own, cells);
-  out.n_participants = prepared.data.groups.size();
-  out.undefined = why_not_fitted(prepared, own.size());
-  if (out.undefined.empty() && out.n_participants <= groups)
-    out.undefined = "one participant in each group, so no variance within groups";
-  if (!out.undefined.empty()) return out;
-  const RemlOptimum optimum = reml_optimum(prepared.data, random_coding(own.size()));
-  if (!optimum.converged) {
-    out.undefined = "the fit did not converge";
-    return out;
-  }
-  MixedModel variances;
-  put_variances(optimum, renderers, variances);
-  out.singular = variances.singular;
-
-  const Tester tested(prepared, optimum.point);
-  const std::array<std::pair<const char*, Index>, 3> factors{
-      {{"group", static_cast<Index>(groups)},
-       {"renderer", static_cast<Index>(own.size())},
-       {"shape", static_cast<Index>(shapes)}}};
-  // Weights by group, renderer and shape, in the order of the model's cells.
-  const auto in_order = [&](const MatrixXd& rows) {
-    MatrixXd weights = MatrixXd::Zero(rows.rows(), cells.n);
-    for (std::size_t group = 0, at = 0; group < groups; ++group) {
-      for (std::size_t r = 0; r < own.size(); ++r) {
-        for (std::size_t s = 0; s < shapes; ++s, ++at)
-          weights.col(cells.column[r][group * shapes + s]) = rows.col(static_cast<Index>(at));
-      }
-    }
-    return weights;
-  };
-  for (unsigned effect = 1; effect < 8; ++effect) {
-    MatrixXd rows = MatrixXd::Ones(1, 1);
-    std::string name;
-    for (std::size_t i = 0; i < factors.size(); ++i) {
-      const auto& [factor, levels] = factors[i];
-      const bool in = (effect >> i & 1) != 0;
-      rows = kronecker(rows, in ? helmert_contrasts(levels)
-                                : MatrixXd::Constant(1, levels, 1 / static_cast<double>(levels)));
-      if (in) name += (name.empty() ? "" : ":") + std::string(factor);
-    }
-    if (rows.rows() > 0) out.effects.push_back(joint_test(tested, in_order(rows), name));
-  }
-  for (std::size_t group = 0; group < groups; ++group) {
-    for (std::size_t r = 0; r < own.size(); ++r) {
-      VectorXd weights = VectorXd::Zero(cells.n);
-      for (std::size_t s = 0; s < shapes; ++s)
-        weights(cells.column[r][group * shapes + s]) = 1 / static_cast<double>(shapes);
-      out.means.push_back({group, r, tested(weights)});
-    }
   }
   return out;
 }

@@ -9,7 +9,7 @@
 
 #include "analysis/input/trials.h"
 #include "analysis/statistics/describe.h"
-#include "analysis/statistics/mixed_anova.h"
+#include "analysis/statistics/model_estimate.h"
 #include "analysis/statistics/paired.h"
 
 namespace palpate::analysis {
@@ -57,15 +57,6 @@ RmAnova rm_anova(const ParticipantCells& participant_cells);
 // restricted maximum likelihood (REML), like R's lme4 (Bates et al. 2015) and lmerTest (Kuznetsova
 // et al. 2017).
 
-/// Estimate and test of a coefficient or contrast (natural log of s) with Satterthwaite's degrees
-/// of freedom.
-struct ModelEstimate {
-  std::string undefined;  ///< reason for missing values; empty: all are defined
-  std::optional<double> estimate, se, df_satterthwaite, t, p;
-  std::optional<Interval> ci95;
-  std::optional<double> p_holm;  ///< contrasts only: adjusted over all contrasts
-};
-
 /// A fixed effect in treatment coding.
 struct FixedEffect {
   std::string name;  ///< as in R: "(Intercept)", "rendererray", "rendererray:shapecone"
@@ -100,28 +91,5 @@ struct MixedModel {
 MixedModel mixed_model(const ParticipantCells& participant_cells,
                        const std::vector<std::string>& renderers,
                        const std::vector<std::string>& shapes);
-
-/// Mean log time of a group with a renderer, over shapes.
-struct ModelMean {
-  std::size_t group = 0, renderer = 0;
-  ModelEstimate value;
-};
-
-/// The model log(response_time) ~ group * renderer * shape + (1 + renderer | participant), where
-/// each participant is in one group.
-struct GroupedMixedModel {
-  std::string undefined;  ///< reason if there is no fit; empty: fitted
-  std::string singular;   ///< parameters on the boundary of the parameter space; empty: none
-  std::size_t n_observations = 0, n_participants = 0;
-  /// Type III, with the degrees of freedom of Fai & Cornelius (1996) as in lmerTest: "group",
-  /// "renderer", "group:renderer", "shape", ...
-  std::vector<GroupEffect> effects;
-  std::vector<ModelMean> means;  ///< estimated marginal means
-};
-
-/// \param group_of  of each participant; >= groups: left out \param groups  2 or more
-GroupedMixedModel grouped_mixed_model(const ParticipantCells& participant_cells,
-                                      const std::vector<std::string>& renderers,
-                                      const std::vector<std::size_t>& group_of, std::size_t groups);
 
 }  // namespace palpate::analysis

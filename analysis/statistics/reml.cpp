@@ -80,6 +80,7 @@ constexpr int kMaxSteps = 200;
 // Participants. With more, the criterion had a single minimum in all tests: two starting values
 // suffice as a check.
 constexpr std::size_t kFew = 500;
+constexpr Index kFewEffects = 3;      // more take long
 constexpr double kOnBoundary = 1e-4;  // threshold of a diagonal theta, as in lme4's isSingular()
 
 /// Lambda's lower triangle with a diagonal >= 0 from any root of Lambda Lambda'.
@@ -148,7 +149,7 @@ struct Sums {
 
 void put_derivatives(const RemlStatistics& data, const MatrixXd& coding, const VectorXd& theta,
                      const std::vector<Part>& parts, double y_p_y, RemlPoint& out) {
-  const Index q = data.levels, p = out.beta.size();
+  const Index q = coding.cols(), p = out.beta.size();
   const double degrees_of_freedom = data.degrees_of_freedom;
   const MatrixXd lambda = lower_triangle(theta, q);
   const MatrixXd& c = out.inverse_xx;
@@ -163,7 +164,7 @@ void put_derivatives(const RemlStatistics& data, const MatrixXd& coding, const V
     direction[k] = half + half.transpose();
   }
 
-  out.slope = MatrixXd::Zero(q, q);
+  out.slope = MatrixXd::Zero(data.levels, data.levels);
   std::vector<Sums> sums(n_theta, {{}, VectorXd::Zero(p), 0, 0});
   MatrixXd second_trace = MatrixXd::Zero(static_cast<Index>(n_theta), static_cast<Index>(n_theta));
   MatrixXd second_squares = second_trace;  // first term of the second derivative of u' E u
@@ -236,12 +237,12 @@ void put_derivatives(const RemlStatistics& data, const MatrixXd& coding, const V
   for (Sums& sum : sums) out.information_loss.push_back(std::move(sum.loss));
 }
 
-/// Evaluates the criterion. \param theta lower triangle of Lambda by columns; Psi = coding Lambda
-/// Lambda' coding'. With the treatment coding of the levels theta is that of lme4 (Bates et al.
-/// 2015).
+/// Evaluates the criterion. \param coding  levels x effects \param theta lower triangle of Lambda
+/// by columns; Psi = coding Lambda Lambda' coding'. With the treatment coding of the levels theta
+/// is that of lme4 (Bates et al. 2015).
 RemlPoint reml_point(const RemlStatistics& data, const MatrixXd& coding, const VectorXd& theta,
                      bool with_derivatives) {
-  const MatrixXd half = coding * lower_triangle(theta, data.levels);
+  const MatrixXd half = coding * lower_triangle(theta, coding.cols());
   const MatrixXd psi = half * half.transpose();
   const Index p = data.within.size();
   const double degrees_of_freedom = data.degrees_of_freedom;
@@ -300,11 +301,12 @@ RemlOptimum descend(const RemlStatistics& data, const MatrixXd& coding, VectorXd
     RemlPoint next;
     bool lower = false;
     for (int halved = 0; halved < 40 && !lower; ++halved, length /= 2) {
-      next = reml_point(data, coding, out.theta + length * step, true);
+      next = reml_point(data, coding, out.theta + length * step, false);
       lower = next.deviance <= out.point.deviance - 1e-4 * length * promised + noise;
       if (lower) out.theta += length * step;
     }
     if (!lower) break;
+    next = reml_point(data, coding, out.theta, true);
     // Near the minimum the deviance is constant up to rounding: a step is accepted if it reduces
     // the gradient.
     const bool done = promised < noise && next.gradient.norm() >= 0.5 * out.point.gradient.norm();
@@ -344,7 +346,7 @@ VectorXd with_small_diagonals_at_zero(VectorXd theta, Index q) {
 /// exactly 0.
 RemlOptimum optimum_from(const RemlStatistics& data, const MatrixXd& coding,
                          const VectorXd& start) {
-  const Index q = data.levels;
+  const Index q = coding.cols();
   RemlOptimum best = descend(data, coding, start);
   for (int i = 0; i < 10; ++i) {
     best.theta = theta_of(lower_triangle(best.theta, q));
@@ -374,9 +376,9 @@ MatrixXd by_moments(const RemlStatistics& data) {
   const Index q = data.levels;
   const RemlPoint flat =
       reml_point(data, MatrixXd::Identity(q, q), VectorXd::Zero(q * (q + 1) / 2), false);
-  const double within = std::max(1e-300, (data.yy - 2 * flat.beta.dot(data.xy) +
-                                          flat.beta.dot(data.within.cwiseProduct(flat.beta))) /
-                                             std::max(1.0, data.degrees_of_freedom));
+  double within = std::max(1e-300, (data.yy - 2 * flat.beta.dot(data.xy) +
+                                    flat.beta.dot(data.within.cwiseProduct(flat.beta))) /
+                                       std::max(1.0, data.degrees_of_freedom));
   MatrixXd products = MatrixXd::Zero(q, q), pairs = products, noise = products;
   for (const RemlParticipant& group : data.groups) {
     const VectorXd rest = group.y - group.x * flat.beta;
@@ -387,6 +389,8 @@ MatrixXd by_moments(const RemlStatistics& data) {
       noise(level, level) += 1 / group.counts(i);
     }
   }
+  // With one trial in each level nothing varies within.
+  within = std::max(within, 1e-6 * products.trace() / std::max(1.0, pairs.trace()));
   const MatrixXd raw = (products / within - noise).cwiseQuotient(pairs.cwiseMax(1));
   const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(raw);
   const double floor = 1e-3 * std::max(eigen.eigenvalues().maxCoeff(), 1e-2);
@@ -553,13 +557,15 @@ ReducedModel::ReducedModel(const ParticipantCells& participant_cells, const Mode
 }
 
 RemlOptimum reml_optimum(const RemlStatistics& data, const MatrixXd& coding) {
-  const Index q = data.levels;
-  const MatrixXd inverse = coding.inverse();
+  const Index q = coding.cols();
+  const MatrixXd inverse = coding.rows() == q
+                               ? MatrixXd(coding.inverse())
+                               : MatrixXd(coding.completeOrthogonalDecomposition().pseudoInverse());
   const MatrixXd moments = inverse * by_moments(data) * inverse.transpose();
   const VectorXd first = theta_of(moments.llt().matrixL());
   std::vector<VectorXd> starts{first};
   starts.push_back(theta_of(MatrixXd::Identity(q, q)));  // starting value of lme4
-  if (data.groups.size() <= kFew) {
+  if (data.groups.size() <= kFew && q <= kFewEffects) {
     starts.push_back(theta_of(0.1 * MatrixXd::Identity(q, q)));
     MatrixXd turned = lower_triangle(first, q);  // correlations with the opposite sign
     turned.triangularView<Eigen::StrictlyLower>() *= -1;
@@ -578,10 +584,11 @@ RemlOptimum reml_optimum(const RemlStatistics& data, const MatrixXd& coding) {
   return best;
 }
 
-MatrixXd lower_triangle(const VectorXd& theta, Index levels) {
-  MatrixXd lambda = MatrixXd::Zero(levels, levels);
+MatrixXd lower_triangle(const VectorXd& theta, Index effects) {
+  MatrixXd lambda = MatrixXd::Zero(effects, effects);
   Index k = 0;
-  for (const auto& [row, column] : lower_triangle_entries(levels)) lambda(row, column) = theta(k++);
+  for (const auto& [row, column] : lower_triangle_entries(effects))
+    lambda(row, column) = theta(k++);
   return lambda;
 }
 

@@ -3,9 +3,10 @@
 // participant and level of one factor (the renderer), with exact derivatives, and its optimisation.
 //
 // y = X beta + Z b + e, b ~ N(0, sigma^2 Psi) for each participant, e ~ N(0, sigma^2). Z has a
-// column for each level, so a participant's means of y and X at each level are sufficient for Psi;
-// the deviations of trials from these means enter through cross-products that do not depend on Psi.
-// An evaluation costs O(participants x columns^2 + columns^3), whatever the number of trials.
+// column for each level and Psi the rank of the effects that participants differ in, so a
+// participant's means of y and X at each level are sufficient for Psi; the deviations of trials
+// from these means enter through cross-products that do not depend on Psi. An evaluation costs
+// O(participants x columns^2 + columns^3), whatever the number of trials.
 
 #include <Eigen/Dense>
 #include <cstddef>
@@ -50,7 +51,7 @@ struct RemlPoint {
 };
 
 /// Lambda from theta.
-Eigen::MatrixXd lower_triangle(const Eigen::VectorXd& theta, Eigen::Index levels);
+Eigen::MatrixXd lower_triangle(const Eigen::VectorXd& theta, Eigen::Index effects);
 
 /// Minimum of the criterion.
 struct RemlOptimum {
@@ -60,6 +61,7 @@ struct RemlOptimum {
 };
 
 /// Newton's method with positive definite Hessian and line search, from several starting values.
+/// \param coding  levels x effects, of full column rank: Psi = coding Lambda Lambda' coding'
 RemlOptimum reml_optimum(const RemlStatistics& data, const Eigen::MatrixXd& coding);
 
 // Reduces participants' cells to the sufficient statistics of the REML criterion, with as few

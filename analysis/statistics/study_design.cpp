@@ -104,44 +104,69 @@ std::optional<CrossedStimuli> crossed_stimuli(const std::vector<std::string>& st
   return out;
 }
 
+/// The cells of a study of shapes: renderers, then what the shapes cross.
+struct ShapeCells {
+  std::vector<StudyFactor> within;  ///< renderer, factors, shape
+  bool crossed = false;             ///< there are factors
+  /// Index of each cell's shape, the plain shapes innermost; the same with every renderer.
+  std::vector<std::size_t> shapes;
+};
+
+ShapeCells cells_of_shapes(const Analysis& analysis, const StudyTable& table) {
+  ShapeCells out{{{"renderer", analysis.table.renderers}}, false, {}};
+  if (const auto crossed = crossed_stimuli(analysis.table.shapes, table.factors)) {
+    out.crossed = true;
+    out.within.insert(out.within.end(), crossed->factors.begin(), crossed->factors.end());
+    out.within.push_back({"shape", crossed->plain});
+    out.shapes = crossed->cells;
+  } else {
+    out.within.push_back({"shape", analysis.table.shapes});
+    for (std::size_t i = 0; i < analysis.table.shapes.size(); ++i) out.shapes.push_back(i);
+  }
+  return out;
+}
+
 /// A measure of identification, by renderer, factors and shape.
 GroupedMeasure identification_by_design(const Analysis& analysis, const StudyTable& table,
                                         CellValue value) {
   GroupedMeasure out;
   out.groups = table.group_labels.names;
-  out.within = {{"renderer", analysis.table.renderers}};
-  std::vector<std::size_t> shapes;
-  if (const auto crossed = crossed_stimuli(analysis.table.shapes, table.factors)) {
-    out.crossed = true;
-    out.within.insert(out.within.end(), crossed->factors.begin(), crossed->factors.end());
-    out.within.push_back({"shape", crossed->plain});
-    shapes = crossed->cells;
-  } else {
-    out.within.push_back({"shape", analysis.table.shapes});
-    for (std::size_t i = 0; i < analysis.table.shapes.size(); ++i) shapes.push_back(i);
-  }
+  ShapeCells cells = cells_of_shapes(analysis, table);
+  out.crossed = cells.crossed;
   for (std::size_t p = 0; p < analysis.table.participants.size(); ++p) {
     const std::string& name = analysis.table.participants[p];
     const auto group = known_group(table.group_labels, name);
     if (!group) continue;
     GroupedFigures one{name, *group, {}};
     for (const auto& renderer : analysis.description.participant_cells) {
-      for (const std::size_t shape : shapes) one.values.push_back(value(renderer[shape][p]));
+      for (const std::size_t shape : cells.shapes) one.values.push_back(value(renderer[shape][p]));
     }
     out.figures.push_back(std::move(one));
   }
+  out.within = std::move(cells.within);
   compare_measure(table.tests, out);
   return out;
 }
 
-GroupedMixedModel model_of_times(const Analysis& analysis, const GroupLabels& labels) {
-  std::vector<std::size_t> group_of;
-  for (const std::string& name : analysis.table.participants) {
-    const auto group = labels.of.find(name);
-    group_of.push_back(group == labels.of.end() ? labels.names.size() : group->second);
+DesignModel model_of_times(const Analysis& analysis, const StudyTable& table) {
+  ShapeCells cells = cells_of_shapes(analysis, table);
+  DesignedTimes times;
+  times.shapes = cells.within.back().levels.size();
+  cells.within.pop_back();
+  times.conditions = sizes_of(cells.within);
+  times.groups = std::max<std::size_t>(1, table.group_labels.names.size());
+  for (const auto& renderer : analysis.description.participant_cells) {
+    for (std::size_t i = 0; i < cells.shapes.size(); ++i) {
+      if (i % times.shapes == 0) times.cells.emplace_back();
+      times.cells.back().push_back(renderer[cells.shapes[i]]);
+    }
   }
-  return grouped_mixed_model(analysis.description.participant_cells, analysis.table.renderers,
-                             group_of, labels.names.size());
+  for (const std::string& name : analysis.table.participants)
+    times.group_of.push_back(known_group(table.group_labels, name).value_or(times.groups));
+  DesignModel out =
+      design_model(times, cells.crossed ? WithinContrasts::added : WithinContrasts::left_out);
+  adjust_effects(table.tests, out.effects);
+  return out;
 }
 
 /// The results of a task's measure in every cell of a block, for a plain stimulus: one result where
@@ -241,7 +266,7 @@ std::vector<GroupedMeasure> measures_by_design(const StudyAnalysis& analysis) {
     time.measure = "time";
     time.unit = "s";
     time.logarithms = true;
-    if (!time.crossed) time.model = model_of_times(*analysis.identification, table.group_labels);
+    time.model = model_of_times(*analysis.identification, table);
     GroupedMeasure accuracy =
         identification_by_design(*analysis.identification, table, share_correct);
     accuracy.measure = "accuracy";

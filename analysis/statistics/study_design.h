@@ -8,7 +8,7 @@
 
 #include "analysis/input/study_table.h"
 #include "analysis/statistics/between_groups.h"
-#include "analysis/statistics/mixed_model.h"
+#include "analysis/statistics/design_model.h"
 
 namespace palpate::analysis {
 
@@ -29,7 +29,7 @@ struct GroupedMeasure {
   std::vector<GroupedFigures> figures;  ///< of every participant, the cells of `within` in order
   BetweenGroups result;
   /// Of the logarithms of single times; none: another measure.
-  std::optional<GroupedMixedModel> model;
+  std::optional<DesignModel> model;
 };
 
 /// Whether an effect belongs to the family that the protocols name. \param tests  empty: all do

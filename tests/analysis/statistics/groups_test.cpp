@@ -13,9 +13,9 @@
 
 #include "analysis/statistics/between_groups.h"
 #include "analysis/statistics/describe.h"
+#include "analysis/statistics/design_model.h"
 #include "analysis/statistics/group_power.h"
 #include "analysis/statistics/mixed_anova.h"
-#include "analysis/statistics/mixed_model.h"
 #include "data/base/random.h"
 
 namespace palpate::analysis {
@@ -123,15 +123,18 @@ ParticipantCells cells_of(const GroupsJson& study) {
 
 /// R's derivatives are numerical: hence the tolerances. On the boundary its degrees of freedom are
 /// of another point.
-TEST(GroupedMixedModel, AgreesWithLmerTest) {
+TEST(DesignModel, AgreesWithLmerTest) {
   std::size_t compared = 0;
   const GroupsJson all = fixture();
   for (const auto& study : all["models"]) {
-    const GroupedMixedModel model =
-        grouped_mixed_model(cells_of(study), {"point", "ray"},
-                            study["group"].get<std::vector<std::size_t>>(), study["groups"]);
+    const DesignModel model = design_model({cells_of(study),
+                                            {{"renderer", 2}},
+                                            3,
+                                            study["group"].get<std::vector<std::size_t>>(),
+                                            study["groups"]},
+                                           WithinContrasts::left_out);
     ASSERT_EQ(model.undefined, "");
-    EXPECT_EQ(model.singular.empty(), !study["singular"].get<bool>());
+    EXPECT_EQ(model.taken_out.empty(), !study["singular"].get<bool>());
     if (study["singular"]) continue;
     for (const auto& expected : study["effects"]) {
       SCOPED_TRACE(expected["name"].get<std::string>());
@@ -147,7 +150,8 @@ TEST(GroupedMixedModel, AgreesWithLmerTest) {
     }
     for (const auto& expected : study["means"]) {
       const auto found = std::ranges::find_if(model.means, [&](const ModelMean& one) {
-        return one.group == expected["group"] && one.renderer == expected["renderer"];
+        return one.group == expected["group"] && one.condition &&
+               one.condition->level == expected["renderer"];
       });
       ASSERT_NE(found, model.means.end());
       EXPECT_NEAR(*found->value.estimate, expected["mean"].get<double>(), 1e-5);
@@ -158,7 +162,7 @@ TEST(GroupedMixedModel, AgreesWithLmerTest) {
 }
 
 /// With as many trials in every cell, the test of the group is that of participants' means.
-TEST(GroupedMixedModel, BalancedGroupsGiveTheAnovaOfMeans) {
+TEST(DesignModel, BalancedGroupsGiveTheAnovaOfMeans) {
   for (const std::uint64_t seed : {1U, 2U}) {
     Random random(seed);
     constexpr std::size_t kPeople = 24;
@@ -183,7 +187,8 @@ TEST(GroupedMixedModel, BalancedGroupsGiveTheAnovaOfMeans) {
       }
       rows.push_back(row);
     }
-    const GroupedMixedModel model = grouped_mixed_model(cells, {"point", "ray"}, group_of, 2);
+    const DesignModel model =
+        design_model({cells, {{"renderer", 2}}, 2, group_of, 2}, WithinContrasts::left_out);
     const MixedAnova anova = mixed_anova(rows, 2, {{"renderer", 2}});
     for (const char* const name : {"group", "renderer", "group:renderer"}) {
       const auto found = std::ranges::find(model.effects, name, &GroupEffect::name);
@@ -194,7 +199,7 @@ TEST(GroupedMixedModel, BalancedGroupsGiveTheAnovaOfMeans) {
   }
 }
 
-TEST(GroupedMixedModel, EmptyCellsSayWhy) {
+TEST(DesignModel, EmptyCellsSayWhy) {
   ParticipantCells cells(2, std::vector(2, std::vector<ParticipantCell>(4)));
   for (std::size_t r = 0; r < 2; ++r) {
     for (std::size_t s = 0; s < 2; ++s) {
@@ -206,8 +211,9 @@ TEST(GroupedMixedModel, EmptyCellsSayWhy) {
       }
     }
   }
-  EXPECT_EQ(grouped_mixed_model(cells, {"point", "ray"}, {0, 1, 0, 1}, 2).undefined,
-            "a cell of group, renderer and shape has no time");
+  EXPECT_EQ(design_model({cells, {{"renderer", 2}}, 2, {0, 1, 0, 1}, 2}, WithinContrasts::left_out)
+                .undefined,
+            "a cell of the design has no time");
 }
 
 std::vector<GroupedRow> drawn(Random& random, std::vector<std::size_t> sizes, std::size_t cells) {

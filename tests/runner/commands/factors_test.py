@@ -197,6 +197,17 @@ class Factors(command_case.CommandCase):
         found = self.analyzed("--db", db)
         self.assertEqual(set(found["effects"]["time"]), {":".join(name for name, there in zip(("renderer", "surface", "shape"), bits) if there)
                                                          for bits in [(1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 1, 0), (1, 0, 1), (0, 1, 1), (1, 1, 1)]})
+        model = next(one for one in found["by_design"] if one["measure"] == "time")["mixed_model"]
+        self.assertTrue(model["formula"].startswith("log(response_time) ~ renderer * surface * shape + (1"), model["formula"])
+        self.assertEqual(set(model["effects"]), set(found["effects"]["time"]))
+        self.assertEqual(model["effects"], found["model_effects"]["time"])
+        self.assertEqual({(one["renderer"], one["factor"], one["level"]) for one in model["means"]},
+                         {(None, None, None), ("point", None, None), ("ray", None, None), (None, "surface", "smooth"), (None, "surface", "rough")})
+        said = self.palpate("analyze", "--db", db, "--report", self.dir / "r.html").stdout
+        self.assertIn(model["formula"], said)
+        for slope in model["slopes_taken_out"]:
+            self.assertIn(slope, said)
+        self.assertIn("linear mixed model of single trials", (self.dir / "r.html").read_text())
 
     def test_interrupted_studies_go_on_in_their_cells(self):
         whole = self.exported(self.simulated(SMALL, "--participants", 3, name="whole.db"))[1]
