@@ -20,7 +20,7 @@ using Eigen::VectorXd;
 /// With more, an evaluation of the derivatives takes too long.
 constexpr Index kMostEffects = 8;
 constexpr double kMostWork = 2e8;  ///< multiplications of one evaluation
-constexpr double kZero = 1e-4;     ///< relative to the residual sd, as lme4's isSingular()
+constexpr double kSingular = 1e-4;     ///< relative to the residual sd, as lme4's isSingular()
 
 /// A product of factors: bit i is that of factor i.
 using Product = unsigned;
@@ -95,7 +95,7 @@ struct Fit {
 };
 
 bool is_singular(const RemlOptimum& optimum, Index effects) {
-  return lower_triangle(optimum.theta, effects).diagonal().minCoeff() < kZero;
+  return lower_triangle(optimum.theta, effects).diagonal().minCoeff() < kSingular;
 }
 
 Fit fitted(const ReducedModel& data, const DesignedTimes& times) {
