@@ -19,8 +19,8 @@ using Eigen::VectorXd;
 
 /// With more, an evaluation of the derivatives takes too long.
 constexpr Index kMostEffects = 8;
-constexpr double kMostWork = 2e8;  ///< multiplications of one evaluation
-constexpr double kSingular = 1e-4;     ///< relative to the residual sd, as lme4's isSingular()
+constexpr double kMostWork = 2e8;   ///< multiplications of one evaluation
+constexpr double kSingular = 1e-4;  ///< relative to the residual sd, as lme4's isSingular()
 
 /// A product of factors: bit i is that of factor i.
 using Product = unsigned;
