@@ -2,10 +2,9 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <sstream>
 #include <utility>
-
-#include "stimuli/layers/solid_depth.h"
 
 namespace palpate::runner {
 namespace {

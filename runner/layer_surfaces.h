@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "rendering/scene.h"
-#include "rendering/surface.h"
 #include "stimuli/layers/layer_surface.h"
 #include "stimuli/shapes.h"
 

@@ -24,6 +24,9 @@ namespace palpate::runner {
 
 const rendering::Renderer& renderer_for(protocols::RendererKind kind);
 
+/// What objects have to feel beside their surface.
+std::vector<rendering::ObjectEffects> effects_of(const std::vector<stimuli::ObjectSpec>& objects);
+
 rendering::Tool tool_of(const protocols::ToolSpec& spec);
 /// \param length  m, of the real stylus. \param grip  m from its tip; beyond the tail: the tail
 rendering::Reach reach_of(const protocols::ReachSpec& spec, double length, double grip);
