@@ -12,7 +12,7 @@ inline constexpr double kLayerError = 0.03;
 
 struct LayerSurface {
   ClosedSurface surface;  ///< without triangles: nothing is left
-  double error = 0;       ///< m; its depth differs at most so much from the one asked for
+  double error = 0;       ///< m; measured: its depth differs so much from the one asked for
 };
 
 /// All points of the solid at least `depth` (m, above 0) below its surface. Exact under plane faces
