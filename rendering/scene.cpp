@@ -183,7 +183,8 @@ bool Scene::differs_in_feel_only(const Scene& other) const {
            std::ranges::equal(a.mesh->vertices(), b.mesh->vertices());
   };
   const auto same_surface = [&](const PlacedSurface& a, const PlacedSurface& b) {
-    return same_place(a, b) && a.first_material == b.first_material &&
+    return same_place(a, b) && a.first_material == b.first_material && a.layer == b.layer &&
+           a.breaking == b.breaking && a.break_force == b.break_force &&
            std::ranges::equal(a.surface->vertices(), b.surface->vertices()) &&
            a.surface->triangles().size() == b.surface->triangles().size();
   };
@@ -230,6 +231,7 @@ void Scene::add_surfaces(std::vector<SceneSurface> surfaces, TickFeatures& featu
     group.first_pair = pairs;
     group.solid = placed.object;
     group.by_law = true;
+    group.felt = placed.layer != kNotFelt;
     group.skin = surface.skin;
     group.surface = static_cast<std::uint32_t>(surfaces_.size());
     const auto same = std::find_if(groups_.begin(), groups_.end(), [&](const PartGroup& other) {
@@ -238,6 +240,12 @@ void Scene::add_surfaces(std::vector<SceneSurface> surfaces, TickFeatures& featu
     group.object_state =
         same != groups_.end() ? same->object_state : static_cast<std::uint32_t>(object_states_++);
     pairs += kMostPlanes;
+    surface.layer = placed.layer;
+    if (std::isfinite(placed.break_force)) {
+      surface.breaking = static_cast<std::uint32_t>(breaking_.size());
+      surface.break_force = placed.break_force;
+      breaking_.push_back({group.object_state, placed.break_force, surface.group});
+    }
     groups_.push_back(group);
     surfaces_.push_back(std::move(surface));
   }

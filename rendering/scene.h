@@ -49,13 +49,15 @@ struct SceneObject {
   int own_solid() const { return solid != kAlone ? solid : object; }
 };
 
-/// A closed surface to be put into a scene: all shells of an object, or of fixed objects that
-/// touch.
+/// A closed surface to be put into a scene: all shells of an object or of one of its layers, or of
+/// fixed objects that touch.
 struct SceneSurface {
   std::shared_ptr<const Surface> surface;
   Pose pose;
   int object = 0;               ///< index of the object in the scene; of several the first
   std::vector<int> of_shell{};  ///< object of each shell; empty: all are of `object`
+  int layer = 0;                ///< as of SceneObject
+  double break_force = std::numeric_limits<double>::infinity();  ///< N; of a layer
 };
 
 /// One convex part as the tick uses it.

@@ -334,6 +334,8 @@ bool SurfaceTool::virtual_inside() {
 void follow_on_surface(UnionTick& tick, std::uint32_t surface) {
   const PlacedSurface& placed = tick.scene.surfaces()[surface];
   const UnionMemory& all = tick.state.unions;
+  if (placed.breaking != PlacedSurface::kHolds && all.breaking[placed.breaking].strength == 0)
+    return;
   if (!all.groups[placed.group].touching && !(tick.sides && tick.scene.tool() != nullptr) &&
       stylus_is_far(tick, placed, all.surfaces[surface]))
     return;

@@ -748,10 +748,13 @@ void release_hooked(UnionTick& tick) {
   }
 }
 
-/// Null: the contact's part never breaks.
+/// Null: the contact's part or surface never breaks.
 BreakState* breaking_of(UnionTick& tick, const PlacedContact& contact) {
-  if (contact.loaded.part >= tick.scene.parts().size()) return nullptr;  // a surface
-  const std::uint32_t index = tick.scene.parts()[contact.loaded.part].breaking;
+  static_assert(ScenePart::kHolds == PlacedSurface::kHolds);
+  const std::uint32_t surface = tick.scene.groups()[contact.group].surface;
+  const std::uint32_t index = surface != PartGroup::kParts
+                                  ? tick.scene.surfaces()[surface].breaking
+                                  : tick.scene.parts()[contact.loaded.part].breaking;
   return index == ScenePart::kHolds ? nullptr : &tick.state.unions.breaking[index];
 }
 
@@ -759,6 +762,7 @@ BreakState* breaking_of(UnionTick& tick, const PlacedContact& contact) {
 void remove_parts(UnionTick& tick, std::uint32_t breaking) {
   const std::uint32_t index = tick.scene.breaking()[breaking].group;
   const PartGroup& group = tick.scene.groups()[index];
+  if (group.surface != PartGroup::kParts) forget_contacts(tick, index);
   for (std::uint32_t k = 0; k < group.part_count; ++k) {
     if (tick.scene.parts()[group.first_part + k].breaking == breaking) forget_part(tick, group, k);
   }

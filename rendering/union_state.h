@@ -62,6 +62,10 @@ struct PlacedSurface {
   std::vector<int> of_shell;         ///< object of each shell
   std::uint32_t group = 0;           ///< index in Scene::groups()
   std::uint32_t first_material = 0;  ///< of the first shell, in Scene::material_of
+  int layer = 0;                     ///< as of SceneObject
+  static constexpr std::uint32_t kHolds = 0xffffffff;
+  std::uint32_t breaking = kHolds;  ///< index in Scene::breaking(); kHolds: never breaks
+  double break_force = 0;           ///< N, where it breaks
 
   Vec3 local_vector(const Vec3& world) const {
     return {glm::dot(to_world[0], world), glm::dot(to_world[1], world),

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cstddef>
-#include <cstring>
+#include <cstdio>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <glm/vector_relational.hpp>
@@ -13,9 +13,7 @@
 #include <sstream>
 #include <stdexcept>
 
-#include "protocols/tasks/levels.h"
 #include "rendering/bodies/soft/soft_scene.h"
-#include "runner/sight_bounds.h"
 #include "runner/touching_solids.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/convex_mesh.h"
@@ -93,18 +91,6 @@ std::shared_ptr<const stimuli::Texture> seen_from(
   return std::make_shared<const stimuli::Texture>(texture->in_frame(in_object));
 }
 
-/// What objects have to feel beside their surface.
-std::vector<rendering::ObjectEffects> effects_of(const std::vector<stimuli::ObjectSpec>& objects) {
-  std::vector<rendering::ObjectEffects> out;
-  for (std::size_t i = 0; i < objects.size(); ++i) {
-    const stimuli::ObjectSpec& spec = objects[i];
-    if (spec.fields.empty() && !spec.transient) continue;
-    out.push_back(
-        {static_cast<int>(i), spec.pose, spec.body.has_value(), spec.fields, spec.transient});
-  }
-  return out;
-}
-
 constexpr double kSteepestTexture = 2;  // of its slope
 
 constexpr std::size_t kLargeMesh = 50'000;  // faces; worth another thread
@@ -164,60 +150,18 @@ bool has_layers(const stimuli::ObjectSpec& spec) {
   return std::any_of(spec.parts.begin(), spec.parts.end(), has_layers);
 }
 
-/// The corners of the box about what is drawn of a stimulus, as it stands.
-/// \param builder  which has built it, as a rule
-DrawnBounds bounds_as_it_stands(const stimuli::ObjectSpec& object, SceneBuilder& builder) {
-  DrawnBounds out;
-  out.origin = object.pose.position;
-  const double infinite = std::numeric_limits<double>::infinity();
-  Vec3 low(infinite), high(-infinite);
-  const rendering::Scene scene = builder.build({object}, false);
-  const auto add = [&](const Vec3& corner) {
-    low = glm::min(low, corner);
-    high = glm::max(high, corner);
-  };
-  for (const rendering::ScenePart& part : scene.parts()) {
-    for (const Vec3& corner : part.mesh->vertices()) add(part.position + part.to_world * corner);
+}  // namespace
+
+std::vector<rendering::ObjectEffects> effects_of(const std::vector<stimuli::ObjectSpec>& objects) {
+  std::vector<rendering::ObjectEffects> out;
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    const stimuli::ObjectSpec& spec = objects[i];
+    if (spec.fields.empty() && !spec.transient) continue;
+    out.push_back(
+        {static_cast<int>(i), spec.pose, spec.body.has_value(), spec.fields, spec.transient});
   }
-  for (const rendering::PlacedSurface& placed : scene.surfaces()) {
-    add(placed.sphere_centre - Vec3(placed.sphere_radius));
-    add(placed.sphere_centre + Vec3(placed.sphere_radius));
-  }
-  for (const auto& soft : rendering::soft_objects(scene)) {
-    for (const Vec3& node : soft->rest) add(node);
-  }
-  for (int i = 0; i < 8; ++i)
-    out.points.emplace_back((i & 1) != 0 ? high.x : low.x, (i & 2) != 0 ? high.y : low.y,
-                            (i & 4) != 0 ? high.z : low.z);
   return out;
 }
-
-/// \param reach  m, of the felt stimulus from the origin of the workspace
-/// \throws MeshError: what is drawn of it leaves the screen
-void require_on_screen(const protocols::Protocol& protocol, const protocols::StimulusSpec& stimulus,
-                       double reach, SceneBuilder& builder) {
-  if (!protocol.view || !stimulus.seen) return;
-  const protocols::SeenSpec& seen = *stimulus.seen;
-  if (!seen.object && !seen.picture) return;
-  DrawnBounds bounds;
-  if (protocol.orientation == protocols::OrientationKind::fixed) {
-    bounds = bounds_as_it_stands(seen.shape ? *seen.shape : stimulus.object, builder);
-  } else {
-    bounds.points = {Vec3(0)};
-    bounds.radius = reach;
-    if (seen.shape) {
-      bounds.radius = 0;
-      for (const Vec3& corner : bounds_as_it_stands(*seen.shape, builder).points)
-        bounds.radius = std::max(bounds.radius, glm::length(corner));
-    }
-  }
-  const std::string fault = off_screen(*protocol.view, workspace_of(protocol), seen, bounds);
-  if (!fault.empty())
-    throw stimuli::MeshError({"stimulus '" + stimulus.name + "': /seen/what: " + fault +
-                              ": move /view/eye_m or /view/screen_m, or draw it smaller"});
-}
-
-}  // namespace
 
 rendering::Tool tool_of(const protocols::ToolSpec& spec) {
   rendering::Tool tool;
@@ -262,7 +206,10 @@ struct SceneBuilder::Placing {
   bool has_layers;  ///< anywhere: then its whole surface says where it ends
   bool by_surface;  ///< what is felt of its own surface is one closed surface
   std::vector<rendering::SceneObject>& out;
-  std::vector<PlacedShape> all = {}, layered = {};       ///< its shapes; those that have layers
+  std::vector<PlacedShape> objects = {};            ///< in the frame of the solid
+  std::vector<LayeredShape> shapes = {};            ///< of those; empty until a layer is a surface
+  LayerShells surfaces = {};                        ///< of those layers
+  std::vector<PlacedShape> all = {}, layered = {};  ///< its shapes; those that have layers
   std::shared_ptr<const stimuli::Texture> texture = {};  ///< of the object that is placed
   Pose object_pose = {};                                 ///< its own
 
@@ -349,6 +296,50 @@ std::vector<SceneBuilder::Prepared> SceneBuilder::layer_of(const std::vector<Pla
   return with_trees(stimuli::inset_union_within(whole, depth, own), placing.side_contact);
 }
 
+/// \param deepest  m; where nothing is left, in: of other shapes, out: the greater one
+/// \return whether something is left
+bool SceneBuilder::place_layer_in_parts(int object, const std::vector<PlacedShape>& shapes,
+                                        const stimuli::Layer& layer, int number, Placing& placing,
+                                        double& deepest) {
+  Pose pose;
+  const std::vector<Prepared> parts = layer_of(shapes, layer.depth, placing, pose);
+  for (const Prepared& part : parts) placing.add(object, number, layer, part, pose);
+  if (parts.empty())
+    deepest = std::max(deepest, stimuli::largest_inset(surfaces_of(shapes, placing.side_contact)));
+  return !parts.empty();
+}
+
+/// The same, as a closed surface.
+bool SceneBuilder::place_layer_surface(int object, const std::vector<PlacedShape>& shapes,
+                                       const stimuli::Layer& layer, int number, Placing& placing,
+                                       double& deepest) {
+  if (placing.shapes.empty()) {
+    for (const PlacedShape& one : placing.objects)
+      add_shapes(*one.spec, one.pose, one.object, placing.shapes);
+  }
+  LayerSurfaces::Wanted wanted{layer, number, {}};
+  for (const PlacedShape& shape : shapes) wanted.shapes.push_back(shape.spec);
+  const LayerSurfaces::Made* made = nullptr;
+  try {
+    made = &layer_surfaces_.make(placing.shapes, wanted);
+  } catch (const stimuli::MeshError&) {
+    throw stimuli::MeshError({"/layers/" + std::to_string(number - 1) +
+                              "/depth_m: what lies so deep has parts that are too thin to tell "
+                              "apart; expected another depth, by a few percent"});
+  }
+  deepest = std::max(deepest, made->deepest);
+  if (made->surface == nullptr) return false;
+  placing.surfaces.add(wanted, object, made->surface);
+  char text[160];
+  std::snprintf(
+      text, sizeof text,
+      "/layers/%d: %zu triangles; where it is round, its depth of %g mm is wrong by up to "
+      "%.2g mm",
+      number - 1, made->surface->triangles.size(), 1e3 * layer.depth, 1e3 * made->error);
+  layer_notes_[object].emplace_back(text);
+  return true;
+}
+
 void SceneBuilder::place_layers(int object, Placing& placing) {
   std::vector<PlacedShape> layered = placing.layered;
   std::erase_if(layered, [&](const PlacedShape& shape) { return shape.object != object; });
@@ -369,14 +360,15 @@ void SceneBuilder::place_layers(int object, Placing& placing) {
       const std::vector<PlacedShape> same(left.begin(), others);
       left.erase(left.begin(), others);
       least = std::min(least, layer.depth);
-      Pose pose;
-      const std::vector<Prepared> parts = layer_of(same, layer.depth, placing, pose);
-      for (const Prepared& part : parts)
-        placing.add(object, static_cast<int>(i) + 1, layer, part, pose);
-      is_left |= !parts.empty();
-      if (!is_left)
-        deepest =
-            std::max(deepest, stimuli::largest_inset(surfaces_of(same, placing.side_contact)));
+      const int number = static_cast<int>(i) + 1;
+      bool by_surface = placing.by_surface, here = false;
+      try {
+        if (!by_surface) here = place_layer_in_parts(object, same, layer, number, placing, deepest);
+      } catch (const stimuli::MeshError&) {
+        by_surface = true;  // where several concave edges meet, parts are not deep enough
+      }
+      if (by_surface) here = place_layer_surface(object, same, layer, number, placing, deepest);
+      is_left |= here;
     }
     if (is_left) continue;
     std::ostringstream text;
@@ -401,8 +393,7 @@ void SceneBuilder::place(const stimuli::ObjectSpec& spec, const Pose& parent, in
   surface.texture =
       is_object ? placing.texture
                 : seen_from(placing.texture, stimuli::compose(inverse(placing.object_pose), pose));
-  const bool in_parts = surface.stiffness > 0 ? !placing.by_surface : placing.has_layers;
-  if (in_parts) {
+  if (!placing.by_surface && (surface.stiffness > 0 || placing.has_layers)) {
     for (const Prepared& part : prepare(spec, 0, placing.side_contact)) {
       rendering::SceneObject placed{part.mesh, pose, surface, object, part.trees};
       placed.solid = placing.solid;
@@ -527,6 +518,35 @@ bool SceneBuilder::has_concave(const stimuli::ObjectSpec& spec) {
                      [&](const stimuli::ObjectSpec& part) { return has_concave(part); });
 }
 
+/// Of a shape that is no compound, in its own frame.
+std::shared_ptr<const stimuli::ClosedSurface> SceneBuilder::closed_surface_of(
+    const stimuli::ObjectSpec& spec) {
+  std::shared_ptr<const stimuli::ClosedSurface> surface;
+  if (spec.shape == stimuli::ShapeKind::mesh) surface = mesh(spec).surface;
+  if (surface != nullptr) return surface;
+  std::shared_ptr<const stimuli::ClosedSurface>& known = convex_[shape_key(spec, false)];
+  if (known == nullptr)
+    known = std::make_shared<const stimuli::ClosedSurface>(
+        stimuli::closed_surface(stimuli::polygons_of(spec)).surface);
+  return known;
+}
+
+/// The closed shapes of an object.
+void SceneBuilder::add_shapes(const stimuli::ObjectSpec& spec, const Pose& in_frame, int object,
+                              std::vector<LayeredShape>& shapes) {
+  if (spec.shape != stimuli::ShapeKind::compound) {
+    shapes.push_back({&spec, closed_surface_of(spec), in_frame, object, shape_key(spec, false)});
+    return;
+  }
+  for (const stimuli::ObjectSpec& part : spec.parts)
+    add_shapes(part, stimuli::compose(in_frame, part.pose), object, shapes);
+}
+
+std::vector<std::string> SceneBuilder::layer_notes(int object) const {
+  const auto known = layer_notes_.find(object);
+  return known != layer_notes_.end() ? known->second : std::vector<std::string>{};
+}
+
 /// The closed surfaces of an object.
 /// \param in_object  the pose of the shape's own frame
 /// \param felt  only of what is felt of it
@@ -538,15 +558,7 @@ void SceneBuilder::add_shells(const stimuli::ObjectSpec& spec, const Pose& in_ob
     return;
   }
   if (felt && !(spec.material.stiffness > 0)) return;
-  std::shared_ptr<const stimuli::ClosedSurface> surface;
-  if (spec.shape == stimuli::ShapeKind::mesh) surface = mesh(spec).surface;
-  if (surface == nullptr) {
-    std::shared_ptr<const stimuli::ClosedSurface>& known = convex_[shape_key(spec, false)];
-    if (known == nullptr)
-      known = std::make_shared<const stimuli::ClosedSurface>(
-          stimuli::closed_surface(stimuli::polygons_of(spec)).surface);
-    surface = known;
-  }
+  std::shared_ptr<const stimuli::ClosedSurface> surface = closed_surface_of(spec);
   stimuli::Material material = spec.material;
   material.layers.clear();
   double error = 0;
@@ -645,21 +657,24 @@ std::vector<std::vector<int>> SceneBuilder::solids_of(
   return connected(static_cast<int>(objects.size()), meet);
 }
 
-/// Places convex parts: of surfaces without concave edges, of layers, and for collisions.
+/// Places convex parts, of surfaces and layers without concave edges and for collisions, and other
+/// layers.
 void SceneBuilder::place_parts(const std::vector<stimuli::ObjectSpec>& objects,
                                const std::vector<int>& solid, Placing& placing, Placed& out) {
   for (const int object : solid) {
     const auto index = static_cast<std::size_t>(object);
-    std::string reason = "layers need convex parts, and it cannot be cut into them: ";
+    std::string reason;
     try {
       if (object == solid.front()) {
         for (const int one : solid) {
           const stimuli::ObjectSpec& spec = objects[static_cast<std::size_t>(one)];
+          placing.objects.push_back({&spec, solid.size() == 1 ? Pose{} : spec.pose, one});
           placing.texture = texture_of(spec);
           placing.object_pose = spec.pose;
           place(spec, Pose{}, one, placing);
         }
       }
+      layer_notes_.erase(object);
       place_layers(object, placing);
       const std::string meets = met_by(objects, index);
       if (!placing.by_surface || meets.empty()) continue;
@@ -706,7 +721,18 @@ SceneBuilder::Placed SceneBuilder::placed(const std::vector<stimuli::ObjectSpec>
   Placing placing{alone ? rendering::kAlone : solid.front(), side_contact, has_layers(whole),
                   by_surface, out.parts};
   place_parts(objects, solid, placing, out);
-  if (!by_surface) return out;
+  for (const LayeredShape& shape : placing.shapes) {
+    if (by_surface && !(shape.spec->material.stiffness > 0)) placing.surfaces.add_bound(shape);
+  }
+  const auto add_layers = [&] {
+    for (rendering::SceneSurface& layer :
+         placing.surfaces.surfaces(alone ? first.pose : Pose{}, solid.front()))
+      out.surfaces.push_back(std::move(layer));
+  };
+  if (!by_surface) {
+    add_layers();
+    return out;
+  }
   rendering::SceneSurface placed{nullptr, alone ? first.pose : Pose{}, solid.front(), {}};
   std::vector<rendering::SurfaceShell> shells;
   for (const int object : solid) {
@@ -720,7 +746,7 @@ SceneBuilder::Placed SceneBuilder::placed(const std::vector<stimuli::ObjectSpec>
     placed.of_shell.resize(shells.size(), object);
   }
   if (shells.empty()) {
-    out.solids.clear();  // its parts without force serve as solids
+    add_layers();
     return out;
   }
   std::string key;
@@ -733,6 +759,7 @@ SceneBuilder::Placed SceneBuilder::placed(const std::vector<stimuli::ObjectSpec>
     placed.surface = std::make_shared<const rendering::Surface>(shells);
   if (!key.empty()) surfaces_.emplace(key, placed.surface);
   out.surfaces.push_back(std::move(placed));
+  add_layers();
   return out;
 }
 
@@ -780,101 +807,6 @@ rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& obj
   } catch (const std::invalid_argument& error) {
     throw stimuli::MeshError({error.what()});
   }
-}
-
-StimulusLibrary::StimulusLibrary(const protocols::Protocol& protocol, SceneBuilder builder)
-    : soft_radius_(protocol.tool.radius > 0 ? protocol.tool.radius : protocols::kSoftRadius),
-      gravity_(protocol.gravity),
-      tool_(tool_of(protocol.tool)),
-      grip_(grip_from_virtual_tip(protocol)) {
-  for (const protocols::StimulusSpec& stimulus : protocols::with_all_levels(protocol).stimuli) {
-    double reach = 0;
-    soft_.emplace_back();
-    specs_.emplace_back();
-    if (stimulus.object.soft) specs_.back() = stimulus.object;
-    for (const bool sides : {false, true}) {
-      std::vector<rendering::SceneObject> objects;
-      try {
-        const rendering::Scene scene =
-            builder.build({stimulus.object}, sides, {}, gravity_, soft_radius_);
-        for (const auto& object : rendering::soft_objects(scene)) {
-          soft_.back() = object;
-          for (const Vec3& node : object->rest) reach = std::max(reach, glm::length(node));
-        }
-        for (const rendering::ScenePart& part : scene.parts()) {
-          objects.push_back({part.mesh,
-                             {part.position, glm::quat_cast(part.to_world)},
-                             part.material,
-                             0,
-                             part.trees,
-                             part.layer,
-                             part.break_force});
-          if (part.layer <= 0)  // layers are inside of the surface
-            reach = std::max(reach, glm::length(part.sphere_centre) + part.sphere_radius);
-        }
-        if (!sides) {
-          edges_.emplace_back(scene);
-          auto& own = surfaces_.emplace_back();
-          for (const rendering::PlacedSurface& placed : scene.surfaces()) {
-            own.push_back({placed.surface, {placed.position, glm::quat_cast(placed.to_world)}, 0});
-            reach = std::max(reach, glm::length(placed.sphere_centre) + placed.sphere_radius);
-          }
-        }
-      } catch (const stimuli::MeshError& error) {
-        std::vector<std::string> faults;
-        for (std::string fault : error.faults()) {
-          if (fault.starts_with("/objects/0/")) fault.erase(0, std::strlen("/objects/0"));
-          faults.push_back("stimulus '" + stimulus.name + "': " + fault);
-        }
-        throw stimuli::MeshError(std::move(faults));
-      }
-      (sides ? with_sides_ : without_sides_).push_back(std::move(objects));
-    }
-    effects_.push_back(effects_of({stimulus.object}));
-    textures_.push_back(builder.texture_of(stimulus.object));
-    moving_.push_back(builder.moving_of({stimulus.object}));
-    require_on_screen(protocol, stimulus, reach, builder);
-    reaches_.push_back(reach);
-    felt_.push_back(stimulus.felt);
-  }
-}
-
-rendering::Scene StimulusLibrary::empty_scene(protocols::RendererKind renderer) const {
-  return rendering::Scene({}, renderer_for(renderer).side_contact(), tool_);
-}
-
-rendering::Scene StimulusLibrary::scene(const protocols::Trial& trial) const {
-  if (!felt_[static_cast<std::size_t>(trial.stimulus)]) return empty_scene(trial.renderer);
-  const bool sides = renderer_for(trial.renderer).side_contact();
-  std::vector<rendering::SceneObject> objects =
-      (sides ? with_sides_ : without_sides_)[trial.stimulus];
-  for (rendering::SceneObject& object : objects)
-    object.pose = stimuli::compose({Vec3(0), trial.orientation}, object.pose);
-  std::vector<rendering::MovingObject> moving = moving_[trial.stimulus];
-  for (rendering::MovingObject& object : moving)
-    object.pose = stimuli::compose({Vec3(0), trial.orientation}, object.pose);
-  std::vector<rendering::SceneSurface> surfaces = surfaces_[trial.stimulus];
-  for (rendering::SceneSurface& surface : surfaces)
-    surface.pose = stimuli::compose({Vec3(0), trial.orientation}, surface.pose);
-  std::shared_ptr<const rendering::SoftObject> soft = soft_[trial.stimulus];
-  std::vector<rendering::ObjectEffects> effects = effects_[trial.stimulus];
-  for (rendering::ObjectEffects& object : effects)
-    object.pose = stimuli::compose({Vec3(0), trial.orientation}, object.pose);
-  const auto with_effects = [&](rendering::Scene scene) {
-    scene.set_effects({std::move(effects), grip_});
-    return scene;
-  };
-  if (soft == nullptr)
-    return with_effects(rendering::moving_scene(std::move(objects), moving, gravity_, sides, tool_,
-                                                true, std::move(surfaces)));
-  if (trial.orientation != Quat(1, 0, 0, 0)) {
-    const stimuli::ObjectSpec& spec = specs_[trial.stimulus];
-    soft = rendering::build_soft_object(spec,
-                                        stimuli::compose({Vec3(0), trial.orientation}, spec.pose),
-                                        {soft_radius_, gravity_, 0});
-  }
-  return with_effects(rendering::soft_scene(rendering::Scene({}, sides, tool_), std::move(objects),
-                                            {soft}, sides, tool_));
 }
 
 }  // namespace palpate::runner

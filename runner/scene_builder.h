@@ -14,6 +14,7 @@
 #include "rendering/renderer.h"
 #include "rendering/scene.h"
 #include "rendering/tool.h"
+#include "runner/layer_surfaces.h"
 #include "runner/sharp_edges.h"
 #include "runner/workspace_map.h"
 #include "stimuli/polygon_soup.h"
@@ -22,6 +23,9 @@
 namespace palpate::runner {
 
 const rendering::Renderer& renderer_for(protocols::RendererKind kind);
+
+/// What objects have to feel beside their surface.
+std::vector<rendering::ObjectEffects> effects_of(const std::vector<stimuli::ObjectSpec>& objects);
 
 rendering::Tool tool_of(const protocols::ToolSpec& spec);
 /// \param length  m, of the real stylus. \param grip  m from its tip; beyond the tail: the tail
@@ -53,15 +57,15 @@ class SceneBuilder {
   /// Null: it is smooth. In the object's frame. \throws MeshError: its steepest slope exceeds 2, or
   /// it is deeper than the object is thick
   std::shared_ptr<const stimuli::Texture> texture_of(const stimuli::ObjectSpec& spec);
-  /// \throws MeshError with the place as a JSON pointer: a shape cannot be cut into convex parts, a
-  /// layer is empty or cannot be made of convex parts (inset_union), or a moving object exceeds a
-  /// limit.
-  /// \param gravity  m/s^2, on what moves or gives
-  /// \param soft_radius  m, of the tool where it touches what gives
-  /// \param grip  m, from the virtual tip: where fields at the grip act
+  /// \throws MeshError with the place as a JSON pointer: a shape that may collide cannot be cut
+  /// into convex parts, a layer is empty, or a moving object exceeds a limit. \param gravity m/s^2,
+  /// on what moves or gives \param soft_radius  m, of the tool where it touches what gives \param
+  /// grip  m, from the virtual tip: where fields at the grip act
   rendering::Scene build(const std::vector<stimuli::ObjectSpec>& objects, bool side_contact,
                          const rendering::Tool& tool = {}, const Vec3& gravity = Vec3(0),
                          double soft_radius = protocols::kSoftRadius, double grip = kSceneGrip);
+  /// How exact the layers of an object are in the scene built last; empty: exact.
+  std::vector<std::string> layer_notes(int object) const;
   /// The indices of all objects, in sets that one ideal tool feels: fixed objects that touch or
   /// cross each other, and each other object alone.
   std::vector<std::vector<int>> solids_of(const std::vector<stimuli::ObjectSpec>& objects);
@@ -111,11 +115,22 @@ class SceneBuilder {
   void place_layers(int object, Placing& placing);
   std::vector<Prepared> layer_of(const std::vector<PlacedShape>& shapes, double depth,
                                  const Placing& placing, Pose& pose);
+  bool place_layer_in_parts(int object, const std::vector<PlacedShape>& shapes,
+                            const stimuli::Layer& layer, int number, Placing& placing,
+                            double& deepest);
+  bool place_layer_surface(int object, const std::vector<PlacedShape>& shapes,
+                           const stimuli::Layer& layer, int number, Placing& placing,
+                           double& deepest);
+  std::shared_ptr<const stimuli::ClosedSurface> closed_surface_of(const stimuli::ObjectSpec& spec);
+  void add_shapes(const stimuli::ObjectSpec& spec, const Pose& in_frame, int object,
+                  std::vector<LayeredShape>& shapes);
 
   std::map<std::string, std::vector<Prepared>> prepared_;  ///< the parts of each shape
   std::map<std::string, LoadedMesh> meshes_;               ///< by shape
   std::map<std::string, std::shared_ptr<const stimuli::ClosedSurface>> convex_;  ///< by shape
   std::map<std::string, std::shared_ptr<const rendering::Surface>> surfaces_;
+  LayerSurfaces layer_surfaces_;
+  std::map<int, std::vector<std::string>> layer_notes_;  ///< by object, of the last build
   std::map<std::string, std::shared_ptr<const stimuli::Texture>> textures_;
 };
 

@@ -24,10 +24,15 @@ SharpEdges::SharpEdges(const rendering::Scene& scene) {
   for (const rendering::ScenePart& part : scene.parts()) {
     if (part.layer != rendering::kNotFelt) surface = std::min(surface, part.layer);
   }
-  for (const rendering::ScenePart& part : scene.parts()) {
-    if (part.layer == surface && (surface == 0 || scene.surfaces().empty())) add_part(part);
+  for (const rendering::PlacedSurface& placed : scene.surfaces()) {
+    if (placed.layer != rendering::kNotFelt) surface = std::min(surface, placed.layer);
   }
-  for (const rendering::PlacedSurface& placed : scene.surfaces()) add_surface(placed);
+  for (const rendering::ScenePart& part : scene.parts()) {
+    if (part.layer == surface) add_part(part);
+  }
+  for (const rendering::PlacedSurface& placed : scene.surfaces()) {
+    if (placed.layer == surface) add_surface(placed);
+  }
   too_many_ = lines_.size() > kMost;
   if (too_many_) lines_.clear();
 }

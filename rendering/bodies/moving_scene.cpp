@@ -71,12 +71,12 @@ MovingBody make_body(const MovingObject& moving, const OwnParts& own) {
     solids.push_back({part.mesh.get(), stimuli::compose(to_object, part.pose)});
   if (solids.empty() && own.surfaces.empty())
     refuse(moving.object, "expected an object with a surface");
+  const auto outer = std::ranges::find(own.surfaces, 0, &SceneSurface::layer);
   const VolumeMoments moments =
       moving.solid != nullptr ? moments_of_surface(*moving.solid, Pose{})
-      : own.surfaces.empty()
+      : outer == own.surfaces.end()
           ? moments_of_union(solids)
-          : moments_of_surface(*own.surfaces.front().surface,
-                               stimuli::compose(to_object, own.surfaces.front().pose));
+          : moments_of_surface(*outer->surface, stimuli::compose(to_object, outer->pose));
   const MassProperties properties = moving.body.mass ? with_mass(moments, *moving.body.mass)
                                                      : with_density(moments, *moving.body.density);
   try {
@@ -967,7 +967,9 @@ Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObjec
   std::copy_if(parts.begin(), parts.end(), std::back_inserter(collide),
                [&](const SceneObject& part) {
                  return part.layer <= 0 &&
-                        std::none_of(surfaces.begin(), surfaces.end(), is_of(part.own_solid()));
+                        std::none_of(surfaces.begin(), surfaces.end(), [&](const auto& surface) {
+                          return surface.layer <= 0 && surface.object == part.own_solid();
+                        });
                });
   std::move(solids.begin(), solids.end(), std::back_inserter(collide));
   std::vector<Scene> shapes;

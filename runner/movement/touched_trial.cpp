@@ -62,14 +62,19 @@ std::vector<Vec3> places_of(const rendering::Scene& scene) {
   for (const rendering::ScenePart& part : scene.parts()) {
     if (part.layer != rendering::kNotFelt) outer = std::min(outer, part.layer);
   }
+  for (const rendering::PlacedSurface& placed : scene.surfaces()) {
+    if (placed.layer != rendering::kNotFelt) outer = std::min(outer, placed.layer);
+  }
   std::vector<SurfaceTriangle> triangles;
   std::vector<const rendering::ScenePart*> parts;
   for (const rendering::ScenePart& part : scene.parts()) {
-    if (part.layer != outer || (outer != 0 && !scene.surfaces().empty())) continue;
+    if (part.layer != outer) continue;
     parts.push_back(&part);
     add_part(part, triangles);
   }
-  for (const rendering::PlacedSurface& placed : scene.surfaces()) add_surface(placed, triangles);
+  for (const rendering::PlacedSurface& placed : scene.surfaces()) {
+    if (placed.layer == outer) add_surface(placed, triangles);
+  }
   if (triangles.empty()) return {};
   constexpr std::size_t kPlaces = analysis::TouchedSurface::kPlaces;
   std::vector<Vec3> places =

@@ -124,6 +124,8 @@ std::vector<std::string> scene_notes(const protocols::SceneSpec& spec,
   for (std::size_t i = 0; i < spec.objects.size(); ++i) {
     for (const std::string& note : mesh_notes(spec.objects[i], builder))
       notes.push_back("/objects/" + std::to_string(i) + ": " + note);
+    for (const std::string& note : builder.layer_notes(static_cast<int>(i)))
+      notes.push_back("/objects/" + std::to_string(i) + note);
     constexpr double kUsualRate = 1000;  // Hz
     const auto texture = builder.texture_of(spec.objects[i]);
     for (const std::string& note :

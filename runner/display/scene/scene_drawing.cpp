@@ -352,6 +352,24 @@ void SceneDrawing::add_layers(const rendering::Scene& scene) {
                {back * (part.position - of.position), back * glm::quat_cast(part.to_world)},
                layers[static_cast<std::size_t>(part.layer) - 1]);
   }
+  for (const rendering::PlacedSurface& placed : scene.surfaces()) {
+    if (placed.layer < 1) continue;
+    for (const std::uint32_t t : placed.surface->file_order()) {
+      const rendering::SurfaceTriangle& triangle = placed.surface->triangles()[t];
+      const auto object = static_cast<std::size_t>(placed.of_shell[triangle.shell]);
+      auto& layers = found[object];
+      layers.resize(std::max(layers.size(), static_cast<std::size_t>(placed.layer)));
+      const Pose& of = objects_[object].pose;
+      const Quat back = glm::conjugate(of.orientation);
+      const glm::vec3 normal(back * placed.world_vector(triangle.normal));
+      for (const std::uint32_t corner : triangle.corners) {
+        const Vec3 place =
+            placed.world_vector(placed.surface->vertices()[corner]) + placed.position;
+        layers[static_cast<std::size_t>(placed.layer) - 1].push_back(
+            {glm::vec3(back * (place - of.position)), normal});
+      }
+    }
+  }
   for (std::size_t i = 0; i < objects_.size(); ++i) {
     objects_[i].layers.clear();
     for (DrawnMesh& mesh : found[i]) {
