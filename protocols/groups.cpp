@@ -75,7 +75,7 @@ void read_patches(ObjectReader& section, const GroupAssignment& groups,
 
 }  // namespace
 
-std::vector<json> read_groups(ObjectReader& reader, Protocol& protocol) {
+std::vector<json> read_groups(ObjectReader& reader, Protocol& protocol, bool& masked) {
   std::vector<json> patches;
   reader.section("groups", [&](ObjectReader& section) {
     GroupAssignment& groups = protocol.groups;
@@ -90,22 +90,19 @@ std::vector<json> read_groups(ObjectReader& reader, Protocol& protocol) {
       section.faults().add(section.pointer("block"),
                            "expected it with \"assign\": \"blocked\" only");
     read_patches(section, groups, patches);
-    bool masked = false;
     section.boolean("masked", masked);
     if (masked && groups.rule == Rule::given)
       section.faults().add(
           section.pointer("masked"),
           "expected it with \"assign\": \"balanced\" or \"blocked\": who names the "
           "group of a participant knows it");
-    groups.seed = protocol.seed;
-    if (!masked) return;
-    const std::vector<std::string> names = groups.names;
-    groups.mask();
-    for (std::size_t i = 0; i < names.size(); ++i) {
-      if (groups.find(names[i]) < names.size())
-        section.faults().add(
-            child_pointer(section.pointer("names"), i),
-            "expected another name than '" + names[i] + "', which stands for a masked group");
+    GroupAssignment shown = groups;
+    if (masked) shown.mask();
+    for (std::size_t i = 0; masked && i < groups.names.size(); ++i) {
+      if (shown.find(groups.names[i]) < groups.names.size())
+        section.faults().add(child_pointer(section.pointer("names"), i),
+                             "expected another name than '" + groups.names[i] +
+                                 "', which stands for a masked group");
     }
   });
   return patches;

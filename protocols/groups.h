@@ -12,9 +12,10 @@
 
 namespace palpate::protocols {
 
-/// Reads the key `groups` into protocol.groups. \return the merge patch (RFC 7396) of each group
+/// Reads the key `groups` into protocol.groups. \param masked  whether its groups are to be masked,
+/// once the seed is known \return the merge patch (RFC 7396) of each group
 /// on the protocol; empty: there are no groups
-std::vector<nlohmann::json> read_groups(ObjectReader& reader, Protocol& protocol);
+std::vector<nlohmann::json> read_groups(ObjectReader& reader, Protocol& protocol, bool& masked);
 
 /// The name of each group and the text of its protocol; without groups "" and the text itself. Not
 /// validated again.

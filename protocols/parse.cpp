@@ -380,11 +380,11 @@ Protocol read_design(const json& root, const MeshFiles& files, FaultList& faults
   reader.section("material",
                  [&](ObjectReader& section) { read_material(section, protocol.material); });
   read_stimuli(reader, protocol, files);
-  reader.seed("seed", protocol.seed);
+  bool masked = false;
   if (protocol.version == 2) {
     read_tasks(reader, protocol, files);
     read_view(reader, protocol);
-    patches = read_groups(reader, protocol);
+    patches = read_groups(reader, protocol, masked);
     read_tested_effects(reader, protocol);
   } else {
     read_identification(reader, protocol);
@@ -395,7 +395,10 @@ Protocol read_design(const json& root, const MeshFiles& files, FaultList& faults
                std::any_of(protocol.stimuli.begin(), protocol.stimuli.end(),
                            [](const auto& stimulus) { return stimulus.object.soft.has_value(); }));
   reader.boolean("samples", protocol.samples);
+  reader.seed("seed", protocol.seed);
   reader.refuse_unknown_keys();
+  protocol.groups.seed = protocol.seed;
+  if (masked) protocol.groups.mask();
   check_reaching(protocol, faults);
   if (faults.empty()) add_cells(root, files, protocol, faults);
   if (faults.empty()) add_channels(protocol);

@@ -9,7 +9,7 @@ import subprocess
 import sys
 import unittest
 
-# Exact products by std::fma, in stimuli/winding_check.cpp and rendering/surface_patch.cpp.
+# Exact products by std::fma, in stimuli/exact_side.cpp and rendering/surface_patch.cpp.
 ASKED_FOR = ("side_of", "rendering5meets")
 
 
