@@ -207,7 +207,7 @@ struct Unmasking {
   std::int64_t utc_ns = 0;  ///< since 1970
   std::string person;       ///< who did it
   std::string program_version;
-  int participants = 0;  ///< with at least one completed trial at that time
+  int participants = 0;  ///< of masked protocols, with a completed trial at that time
 };
 
 /// Whether a participant can have this code: 1 to 32 ASCII letters and digits.

@@ -1,12 +1,15 @@
 // Sessions and runs: a session belongs to a participant; a run is the part of it shown by one
 // process, so an interrupted session has several.
 
+#include <set>
+
 #include "data/base/text.h"
 #include "data/store/attempts.h"
 #include "data/store/connection.h"
 #include "data/store/protocol_rows.h"
 #include "data/store/record_columns.h"
 #include "data/store/unmaskings.h"
+#include "data/stored_protocol.h"
 
 namespace palpate::data {
 namespace {
@@ -153,12 +156,19 @@ void Store::unmask(const std::string& person, const std::string& program_version
     impl_->refuse("expected the name of who unmasks the groups: 1 to " + std::to_string(kLongest) +
                   " bytes of UTF-8 without control characters");
   impl_->commit([&] {
-    SQLite::Statement count(*impl_->db,
-                            "SELECT count(DISTINCT s.participant_id) FROM sessions s JOIN attempts "
-                            "a ON a.session_id = s.id WHERE a.state = 'completed'");
-    count.executeStep();
+    std::set<std::string> codes;
+    for (const ProtocolInfo& protocol : protocols()) {
+      if (!read_stored_protocol(protocol.text).groups.masked()) continue;
+      SQLite::Statement find(*impl_->db,
+                             "SELECT DISTINCT pa.code FROM participants pa JOIN protocols pr ON "
+                             "pr.id = pa.protocol_id JOIN sessions s ON s.participant_id = pa.id "
+                             "JOIN attempts a ON a.session_id = s.id WHERE pr.sha256 = ? AND "
+                             "a.state = 'completed'");
+      Binder(find) << protocol.sha256;
+      while (find.executeStep()) codes.insert(find.getColumn(0).getString());
+    }
     write_unmasking(*impl_->db, impl_->path,
-                    {utc_ns, person, program_version, count.getColumn(0).getInt()});
+                    {utc_ns, person, program_version, static_cast<int>(codes.size())});
     return true;
   });
 }

@@ -222,6 +222,11 @@ class Groups(command_case.CommandCase):
         self.assertEqual({row["group"] for row in self.exported(merged[1])[1]}, {"young", "old"})
         self.assertIn("by me, when 2 participants had trials", self.palpate("unmask", "--db", merged[1]).stdout)
 
+    def test_an_unmasking_counts_who_was_masked(self):
+        db = self.simulated(self.file("pilot.json", SMALL | {"name": "pilot"}), "--groups", "young=3")
+        self.palpate("simulate", self.masked(), "--db", db, "--participants", 2)
+        self.assertIn("when 2 participants had trials", self.palpate("unmask", "--db", db).stdout)
+
     def test_unmasking_without_masks_is_refused(self):
         db = self.simulated(self.grouped(), "--groups", "young=1,old=1")
         self.assertIn("no protocol of it has masked groups", self.palpate("unmask", "--db", db, status=2).stderr)
