@@ -14,6 +14,7 @@
 
 #include "analysis/statistics/mixed_anova.h"
 #include "data/base/random.h"
+#include "tests/analysis/statistics/cells_of_times.h"
 
 namespace palpate::analysis {
 namespace {
@@ -36,23 +37,11 @@ DesignedTimes times_of(const Json& study) {
   out.groups = study["groups"];
   out.group_of = study["group"].get<std::vector<std::size_t>>();
   const std::size_t people = out.group_of.size();
-  out.cells.assign(conditions, std::vector(out.shapes, std::vector<ParticipantCell>(people)));
   std::vector logs(conditions, std::vector(out.shapes, std::vector<std::vector<double>>(people)));
   for (std::size_t i = 0; i < study["y"].size(); ++i)
     logs[study["condition"][i]][study["shape"][i]][study["participant"][i]].push_back(
         study["y"][i]);
-  for (std::size_t c = 0; c < conditions; ++c) {
-    for (std::size_t s = 0; s < out.shapes; ++s) {
-      for (std::size_t p = 0; p < people; ++p) {
-        const std::vector<double>& own = logs[c][s][p];
-        ParticipantCell& cell = out.cells[c][s][p];
-        cell.n_used = own.size();
-        if (own.empty()) continue;
-        cell.mean_log = mean(own);
-        for (const double y : own) cell.sum_of_squares_log += std::pow(y - cell.mean_log, 2);
-      }
-    }
-  }
+  out.cells = cells_of_times(logs);
   return out;
 }
 
@@ -147,23 +136,15 @@ TEST(DesignModel, BalancedFactorsGiveTheAnovaOfMeans) {
 }
 
 DesignedTimes drawn_times(Random& random, std::size_t people, std::size_t trials) {
-  DesignedTimes times{ParticipantCells(4, std::vector(1, std::vector<ParticipantCell>(people))),
-                      {{"renderer", 2}, {"lag", 2}},
-                      1,
-                      std::vector<std::size_t>(people),
-                      1};
+  std::vector logs(4, std::vector(1, std::vector<std::vector<double>>(people)));
   for (std::size_t p = 0; p < people; ++p) {
     const double own = random.normal();
-    for (auto& condition : times.cells) {
-      ParticipantCell& cell = condition[0][p];
-      cell.n_used = trials;
-      std::vector<double> logs;
-      for (std::size_t i = 0; i < trials; ++i) logs.push_back(own + random.normal());
-      cell.mean_log = mean(logs);
-      for (const double y : logs) cell.sum_of_squares_log += std::pow(y - cell.mean_log, 2);
+    for (auto& condition : logs) {
+      for (std::size_t i = 0; i < trials; ++i) condition[0][p].push_back(own + random.normal());
     }
   }
-  return times;
+  return {
+      cells_of_times(logs), {{"renderer", 2}, {"lag", 2}}, 1, std::vector<std::size_t>(people), 1};
 }
 
 /// With one trial in every cell no study can tell slopes of all of them from noise; with three

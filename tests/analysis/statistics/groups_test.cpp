@@ -17,6 +17,7 @@
 #include "analysis/statistics/group_power.h"
 #include "analysis/statistics/mixed_anova.h"
 #include "data/base/random.h"
+#include "tests/analysis/statistics/cells_of_times.h"
 
 namespace palpate::analysis {
 namespace {
@@ -105,20 +106,7 @@ ParticipantCells cells_of(const GroupsJson& study) {
   for (std::size_t i = 0; i < study["y"].size(); ++i)
     times[study["renderer"][i]][study["shape"][i]][study["participant"][i]].push_back(
         study["y"][i]);
-  ParticipantCells cells(2, std::vector(3, std::vector<ParticipantCell>(people)));
-  for (std::size_t r = 0; r < 2; ++r) {
-    for (std::size_t s = 0; s < 3; ++s) {
-      for (std::size_t p = 0; p < people; ++p) {
-        const std::vector<double>& logs = times[r][s][p];
-        ParticipantCell& cell = cells[r][s][p];
-        cell.n_trials = cell.n_correct = cell.n_used = logs.size();
-        if (logs.empty()) continue;
-        cell.mean_log = mean(logs);
-        for (const double log : logs) cell.sum_of_squares_log += std::pow(log - cell.mean_log, 2);
-      }
-    }
-  }
-  return cells;
+  return cells_of_times(times);
 }
 
 /// R's derivatives are numerical: hence the tolerances. On the boundary its degrees of freedom are
