@@ -6,11 +6,10 @@
 #include <limits>
 #include <vector>
 
+#include "stimuli/nearest_on_triangle.h"
 #include "stimuli/vec.h"
 
 namespace palpate::stimuli {
-
-using CornerTriangle = std::array<Vec3, 3>;  ///< counter-clockwise seen from outside, m
 
 class TriangleTree {
  public:
@@ -72,8 +71,5 @@ class TriangleTree {
   std::vector<CornerTriangle> triangles_;
   std::vector<std::uint32_t> given_;
 };
-
-/// The point of a triangle that is nearest to another point.
-Vec3 nearest_on_triangle(const CornerTriangle& triangle, const Vec3& from);
 
 }  // namespace palpate::stimuli
