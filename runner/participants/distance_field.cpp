@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "stimuli/convex_mesh.h"
+#include "stimuli/nearest_on_triangle.h"
 
 namespace palpate::runner::participants {
 namespace {
@@ -16,27 +17,6 @@ constexpr double kLeastMargin = 0.012;  // m
 constexpr int kBand = 6;                // nodes; distances are exact this near the surface
 constexpr double kRounding = 1e-5;      // m; of places in single precision
 constexpr float kUnknown = std::numeric_limits<float>::max();
-
-// Ericson 2005, "Real-Time Collision Detection", 5.1.5.
-Vec3 nearest_on_triangle(const Vec3& p, const Vec3& a, const Vec3& b, const Vec3& c) {
-  const Vec3 ab = b - a, ac = c - a, ap = p - a;
-  const double d1 = glm::dot(ab, ap), d2 = glm::dot(ac, ap);
-  if (d1 <= 0 && d2 <= 0) return a;
-  const Vec3 bp = p - b;
-  const double d3 = glm::dot(ab, bp), d4 = glm::dot(ac, bp);
-  if (d3 >= 0 && d4 <= d3) return b;
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0 && d1 >= 0 && d3 <= 0) return a + d1 / (d1 - d3) * ab;
-  const Vec3 cp = p - c;
-  const double d5 = glm::dot(ab, cp), d6 = glm::dot(ac, cp);
-  if (d6 >= 0 && d5 <= d6) return c;
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0 && d2 >= 0 && d6 <= 0) return a + d2 / (d2 - d6) * ac;
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0)
-    return b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b);
-  return a + (vb * ab + vc * ac) / (va + vb + vc);
-}
 
 /// Computes the nodes of a field.
 class Filling {
@@ -195,7 +175,7 @@ class Filling {
           const Vec3 p = place(x, y, z);
           const double least = std::min<double>(distance_[i], kBand * spacing_);
           if (std::abs(glm::dot(normal, p - a)) >= least) continue;
-          const double apart = glm::distance(p, nearest_on_triangle(p, a, b, c));
+          const double apart = glm::distance(p, stimuli::nearest_on_triangle({a, b, c}, p));
           if (apart < least) distance_[i] = static_cast<float>(apart);
         }
       }
