@@ -362,14 +362,13 @@ void note_factors_of_trials(StudyTable& table) {
 /// Adds the procedures of a protocol, for each of its groups; of masked ones by both names.
 void add_procedures(const std::string& sha256, const std::string& text, const std::string& path,
                     StudyTable& table) {
-  GroupAssignment groups = data::read_stored_protocol(text).groups;
-  const std::vector<std::string> shown = groups.names;
-  groups.unmask();
+  const GroupAssignment masked = data::read_stored_protocol(text).groups;
+  const GroupAssignment groups = masked.unmasked();
   for (const auto& [group, patched] : protocols::texts_of_groups(text)) {
     const auto& found = table.procedures[procedures_key(sha256, group)] =
         protocols::procedures_of_blocks(patched, path);
-    if (const std::size_t at = groups.find(group); at < shown.size() && shown[at] != group)
-      table.procedures[procedures_key(sha256, shown[at])] = found;
+    if (masked.masked())
+      table.procedures[procedures_key(sha256, masked.names[groups.find(group)])] = found;
   }
 }
 
@@ -402,12 +401,11 @@ void label_groups(const std::vector<std::string>& names, StudyTable& table) {
 }
 
 /// The names of a protocol's groups, masked unless a trial has one that is not.
-std::vector<std::string> names_in(const StudyTable& table, GroupAssignment groups) {
+std::vector<std::string> names_in(const StudyTable& table, const GroupAssignment& groups) {
   const bool named = std::ranges::any_of(table.trials, [&](const StudyTrial& trial) {
     return std::ranges::find(groups.true_names, trial.group) != groups.true_names.end();
   });
-  if (named) groups.unmask();
-  return groups.listed();
+  return (named ? groups.unmasked() : groups).listed();
 }
 
 void warn_of_alike_names(StudyTable& table) {

@@ -47,8 +47,10 @@ void GroupAssignment::mask() {
   Random(seed, {kMasks}).shuffle(names);
 }
 
-void GroupAssignment::unmask() {
-  if (masked()) names = std::exchange(true_names, {});
+GroupAssignment GroupAssignment::unmasked() const {
+  GroupAssignment out = *this;
+  if (masked()) out.names = std::exchange(out.true_names, {});
+  return out;
 }
 
 std::vector<std::string> GroupAssignment::listed() const {

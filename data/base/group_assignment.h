@@ -27,8 +27,8 @@ struct GroupAssignment {
   bool masked() const { return !true_names.empty(); }
   /// Shows A, B, ... in place of the names, in an order from the seed.
   void mask();
-  /// Shows the names again.
-  void unmask();
+  /// The same, with the names shown.
+  GroupAssignment unmasked() const;
   /// The name in the protocol. \pre group < names.size()
   const std::string& true_name(std::size_t group) const {
     return masked() ? true_names[group] : names[group];

@@ -9,7 +9,7 @@ namespace palpate::data {
 ParticipantGroups::ParticipantGroups(const std::vector<ProtocolInfo>& protocols, bool unmasked) {
   for (const ProtocolInfo& protocol : protocols) {
     GroupAssignment groups = read_stored_protocol(protocol.text).groups;
-    if (unmasked) groups.unmask();
+    if (unmasked) groups = groups.unmasked();
     masked_ |= groups.masked();
     for (const std::string& name : groups.listed()) {
       if (std::ranges::find(names_, name) == names_.end()) names_.push_back(name);

@@ -524,8 +524,7 @@ std::string PlannedTasks::analyzed(std::size_t study, bool with_effect) const {
   analysis::StudyTable table;
   table.simulated = true;
   table.protocols = {{made_.protocol.name, made_.protocol.sha256}};
-  GroupAssignment groups = made_.protocol.groups;
-  groups.unmask();
+  const GroupAssignment groups = made_.protocol.groups.unmasked();
   // No figure with a name depends on simulated goodness of fit, which takes most of the time.
   simulate(study, with_effect, [&](int number, const data::TrialRecord& record) {
     if (record.practice) return;

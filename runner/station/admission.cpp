@@ -345,7 +345,7 @@ void check_clock(const RunSettings& settings, const Known& known, Admission& adm
 void join_group(const RunSettings& settings, const Known& known, Admission& admission) {
   admission.shown = session::info_of(admission.protocol);
   GroupFacts facts = known.groups;
-  if (known.unmasked) admission.protocol.groups.unmask();
+  if (known.unmasked) admission.protocol.groups = admission.protocol.groups.unmasked();
   const GroupAssignment& groups = admission.protocol.groups;
   facts.completed.resize(groups.names.size());
   if (const auto number = known.numbers.find(admission.enrolled.sha256);

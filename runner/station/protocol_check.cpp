@@ -144,8 +144,7 @@ Json summary_json(const protocols::Protocol& protocol) {
   }
   out["trials"] = trials;
   if (protocol.groups.any()) {
-    GroupAssignment groups = protocol.groups;
-    groups.unmask();
+    const GroupAssignment groups = protocol.groups.unmasked();
     out["groups"] = {{"names", groups.names}, {"assign", to_string(groups.rule)}};
     if (protocol.groups.masked()) out["groups"]["masked_as"] = protocol.groups.listed();
   }

@@ -21,8 +21,7 @@ session::LimitedForSimulation fit_to_simulation(protocols::Protocol& protocol,
              shown, StimulusLibrary(shown), participants::settings_of_group(simulated, group)))
       reasons += "\n" + (group.empty() ? "" : "group '" + group + "': ") + fault;
   };
-  GroupAssignment groups = protocol.groups;
-  groups.unmask();
+  const GroupAssignment groups = protocol.groups.unmasked();
   for (const auto& [name, own] : simulated.groups) {
     if (groups.find(name) == groups.names.size())
       reasons += "\nthe settings have a group '" + name + "', the protocol has none of that name";

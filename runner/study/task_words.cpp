@@ -371,7 +371,7 @@ std::string task_schedule_text(const protocols::Protocol& protocol, int particip
 }
 
 std::string groups_in_words(const protocols::Protocol& protocol) {
-  GroupAssignment groups = protocol.groups;
+  const GroupAssignment& groups = protocol.groups;
   if (!groups.any()) return "";
   const auto listed = [](const std::vector<std::string>& all) {
     std::string out;
@@ -379,8 +379,7 @@ std::string groups_in_words(const protocols::Protocol& protocol) {
     return out;
   };
   const std::string masks = groups.masked() ? " (masked as " + listed(groups.listed()) + ")" : "";
-  groups.unmask();
-  const std::string names = listed(groups.names) + masks;
+  const std::string names = listed(groups.unmasked().names) + masks;
   switch (groups.rule) {
     case GroupAssignment::Rule::balanced:
       return names + ": in turn by participant number";

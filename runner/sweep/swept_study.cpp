@@ -332,8 +332,7 @@ void SweptStudy::check_participant(const SweepParameter& one, std::size_t number
                                    protocols::FaultList& faults) const {
   json settings = settings_;
   if (!one.group.empty()) {
-    GroupAssignment groups = data::read_stored_protocol(protocol_.dump()).groups;
-    groups.unmask();
+    const GroupAssignment groups = data::read_stored_protocol(protocol_.dump()).groups.unmasked();
     if (groups.find(one.group) == groups.names.size())
       faults.add(child_pointer(child_pointer("/parameters", number), "of"),
                  groups.any() ? "expected a group of the protocol: " + listed(groups.names) +

@@ -384,8 +384,7 @@ std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
   row.order_seed = study.order_seed;
   try {
     protocols::Protocol protocol = sweep.study.parse(study.protocol);
-    GroupAssignment groups = protocol.groups;
-    groups.unmask();
+    const GroupAssignment groups = protocol.groups.unmasked();
     const participants::SimulatedSettings settings =
         participants::read_simulated_settings(study.settings.dump());
     session::limit_for_simulation(protocol, settings);

@@ -91,9 +91,8 @@ TEST(GroupAssignment, MasksFollowTheSeed) {
     const std::vector<std::string> masks = groups.names;
     groups.mask();
     EXPECT_EQ(groups.names, masks);
-    groups.unmask();
-    groups.unmask();
-    EXPECT_EQ(groups.names, open.names);
+    EXPECT_EQ(groups.unmasked().names, open.names);
+    EXPECT_EQ(groups.unmasked().unmasked().names, open.names);
   }
   EXPECT_EQ(orders.size(), 6U);
 }
