@@ -9,6 +9,8 @@
 #include <map>
 #include <utility>
 
+#include "analysis/statistics/normal_tail.h"
+
 namespace palpate::analysis {
 namespace {
 
@@ -29,31 +31,10 @@ void find_most_affected(const std::vector<ParticipantCell>& participants, TimeOu
   }
 }
 
-constexpr double kLogRoot2Pi = 0.91893853320467274178;
 constexpr int kMostSteps = 100;
 constexpr double kClose = 1e-13;      // relative gain in likelihood of a Newton step at convergence
 constexpr double kEndless = 1e8;      // 1 / residual sd: the fit is exact
 constexpr double kLongestRatio = 50;  // |log ratio|: the estimate diverges
-
-/// log of the upper tail probability of the standard normal distribution, and its hazard (density /
-/// tail).
-struct Tail {
-  double log = 0, hazard = 0;
-};
-
-Tail upper_tail(double z) {
-  const double log_density = -0.5 * z * z - kLogRoot2Pi;
-  Tail tail;
-  if (z < 20) {
-    tail.log = std::log(0.5 * std::erfc(z / std::sqrt(2.0)));
-  } else {  // erfc underflows: Abramowitz & Stegun 26.2.12, relative error below 1e-10 from here on
-    const double q = 1 / (z * z);
-    tail.log =
-        log_density - std::log(z) + std::log1p(-q * (1 - q * (3 - q * (15 - q * (105 - 945 * q)))));
-  }
-  tail.hazard = std::exp(log_density - tail.log);
-  return tail;
-}
 
 /// One participant's trials with one renderer.
 struct Cell {
@@ -92,7 +73,7 @@ double add_cell(const Cell& cell, double intercept, const Parameters& at, bool r
   double centre_centre = cell.n, centre_g = -sum, g_g = cell.n / (g * g) + about_0;
   for (const auto& [limit, n] : cell.censored) {
     const double z = g * limit - centre;
-    const Tail tail = upper_tail(z);
+    const NormalTail tail = upper_tail(z);
     const double bend = n * tail.hazard * (tail.hazard - z);
     value += n * tail.log;
     by_centre += n * tail.hazard;
