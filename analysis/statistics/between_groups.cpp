@@ -86,11 +86,16 @@ ComparedConditions compared_conditions(const std::vector<WithinFactor>& within, 
   return out;
 }
 
-void adjust_contrasts(std::vector<GroupContrast>& contrasts, std::size_t first) {
-  std::vector<std::optional<double>> p;
-  for (std::size_t i = first; i < contrasts.size(); ++i) p.push_back(contrasts[i].p);
-  const auto adjusted = holm(p);
-  for (std::size_t i = first; i < contrasts.size(); ++i) contrasts[i].p_holm = adjusted[i - first];
+void adjust_contrasts(std::vector<GroupContrast>& contrasts) {
+  for (const bool within : {false, true}) {
+    std::vector<std::optional<double>> p;
+    for (const GroupContrast& one : contrasts)
+      p.push_back(one.within == within ? one.p : std::nullopt);
+    const auto adjusted = holm(p);
+    for (std::size_t i = 0; i < contrasts.size(); ++i) {
+      if (contrasts[i].within == within) contrasts[i].p_holm = adjusted[i];
+    }
+  }
 }
 
 GroupContrast welch(const std::vector<double>& reference, const std::vector<double>& other,
@@ -183,8 +188,6 @@ BetweenGroups compare_groups(const std::vector<GroupedFigures>& figures, std::si
       made.of_difference = one.of_difference;
     }
   }
-  adjust_contrasts(out.contrasts, 0);
-  const std::size_t first = out.contrasts.size();
   for (std::size_t group = 0; contrasts == WithinContrasts::added && group < groups; ++group) {
     for (const Compared& one : differences) {
       GroupContrast& made = out.contrasts.emplace_back(
@@ -193,7 +196,7 @@ BetweenGroups compare_groups(const std::vector<GroupedFigures>& figures, std::si
       made.condition = one.condition;
     }
   }
-  adjust_contrasts(out.contrasts, first);
+  adjust_contrasts(out.contrasts);
   return out;
 }
 

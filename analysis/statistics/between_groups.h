@@ -69,8 +69,8 @@ struct ComparedConditions {
 /// \param shown  of the first that many factors
 ComparedConditions compared_conditions(const std::vector<WithinFactor>& within, std::size_t shown);
 
-/// Sets the p_holm of the contrasts from `first` on, over these.
-void adjust_contrasts(std::vector<GroupContrast>& contrasts, std::size_t first);
+/// Sets the p_holm of the contrasts, over those between participants and over those within groups.
+void adjust_contrasts(std::vector<GroupContrast>& contrasts);
 
 /// \param groups  number of groups; 1: none
 BetweenGroups compare_groups(const std::vector<GroupedFigures>& figures, std::size_t groups,

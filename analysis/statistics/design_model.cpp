@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "analysis/statistics/anova.h"
+#include "analysis/statistics/design_effects.h"
 #include "analysis/statistics/model_tester.h"
 #include "analysis/statistics/reml.h"
 
@@ -22,47 +23,35 @@ constexpr Index kMostEffects = 8;
 constexpr double kMostWork = 2e8;   ///< multiplications of one evaluation
 constexpr double kSingular = 1e-4;  ///< relative to the residual sd, as lme4's isSingular()
 
-/// A product of factors: bit i is that of factor i.
-using Product = unsigned;
-
-bool has(Product product, std::size_t factor) { return (product >> factor & 1) != 0; }
-
-std::string name_of(Product product, const std::vector<std::string>& factors) {
-  std::string out;
-  for (std::size_t i = 0; i < factors.size(); ++i) {
-    if (has(product, i)) out += (out.empty() ? "" : ":") + factors[i];
-  }
-  return out;
-}
-
 /// The products of the factors that vary, those of few factors first.
-std::vector<Product> products_of(const std::vector<WithinFactor>& factors) {
-  std::vector<Product> out;
-  for (Product product = 1; product < 1U << factors.size(); ++product) {
+std::vector<FactorProduct> products_of(const std::vector<WithinFactor>& factors) {
+  std::vector<FactorProduct> out;
+  for (FactorProduct product = 1; product < 1U << factors.size(); ++product) {
     bool varies = true;
     for (std::size_t i = 0; i < factors.size(); ++i)
-      varies = varies && (!has(product, i) || factors[i].levels > 1);
+      varies = varies && (!has_factor(product, i) || factors[i].levels > 1);
     if (varies) out.push_back(product);
   }
-  std::ranges::stable_sort(out, {}, [](Product one) { return std::popcount(one); });
+  std::ranges::stable_sort(out, {}, [](FactorProduct one) { return std::popcount(one); });
   return out;
 }
 
 /// The columns of a product in treatment coding, one row a condition.
-MatrixXd columns_of(Product product, const std::vector<WithinFactor>& factors) {
+MatrixXd columns_of(FactorProduct product, const std::vector<WithinFactor>& factors) {
   MatrixXd out = MatrixXd::Ones(1, 1);
   for (std::size_t i = 0; i < factors.size(); ++i) {
     const auto levels = static_cast<Index>(factors[i].levels);
-    out = kronecker(out, has(product, i)
+    out = kronecker(out, has_factor(product, i)
                              ? MatrixXd(MatrixXd::Identity(levels, levels).rightCols(levels - 1))
                              : MatrixXd::Ones(levels, 1));
   }
   return out;
 }
 
-MatrixXd coding_of(const std::vector<Product>& slopes, const std::vector<WithinFactor>& factors) {
+MatrixXd coding_of(const std::vector<FactorProduct>& slopes,
+                   const std::vector<WithinFactor>& factors) {
   MatrixXd out = columns_of(0, factors);
-  for (const Product slope : slopes) {
+  for (const FactorProduct slope : slopes) {
     const MatrixXd more = columns_of(slope, factors);
     out.conservativeResize(Eigen::NoChange, out.cols() + more.cols());
     out.rightCols(more.cols()) = more;
@@ -90,7 +79,7 @@ ParticipantCells cells_by_group(const DesignedTimes& times) {
 /// The fit with the most slopes that is not singular.
 struct Fit {
   RemlOptimum optimum;
-  std::vector<Product> slopes, taken_out;
+  std::vector<FactorProduct> slopes, taken_out;
   bool singular = false;
 };
 
@@ -144,25 +133,17 @@ std::string why_not_fitted(const ReducedModel& data, const DesignedTimes& times)
   return "";
 }
 
-/// Weights of the model's cells for weights by group, condition and shape.
+/// Weights of the model's cells for weights by group and condition, or by these and shape.
 class CellWeights {
  public:
   CellWeights(const DesignedTimes& times, const ModelCells& cells) : times_(times), cells_(cells) {}
 
-  /// The mean of a group under a condition, or over all conditions.
-  VectorXd mean(std::size_t group, const std::optional<DesignCondition>& condition) const {
-    VectorXd out = VectorXd::Zero(cells_.n);
-    std::size_t inner = 1;
-    for (std::size_t f = condition ? condition->factor + 1 : times_.conditions.size();
-         f < times_.conditions.size(); ++f)
-      inner *= times_.conditions[f].levels;
-    for (std::size_t c = 0; c < times_.cells.size(); ++c) {
-      if (condition && c / inner % times_.conditions[condition->factor].levels != condition->level)
-        continue;
-      for (std::size_t s = 0; s < times_.shapes; ++s)
-        out(cells_.column[c][group * times_.shapes + s]) = 1;
-    }
-    return out / out.sum();
+  /// The same of every shape. \param weights  as of condition_weights
+  VectorXd over_shapes(const VectorXd& weights) const {
+    const auto shapes = static_cast<Index>(times_.shapes);
+    return ordered(kronecker(weights, VectorXd::Constant(shapes, 1 / static_cast<double>(shapes)))
+                       .transpose())
+        .transpose();
   }
 
   /// The rows in the order of the model's cells.
@@ -188,23 +169,11 @@ void put_effects(const DesignedTimes& times, const CellWeights& weights, const M
   std::vector<WithinFactor> factors{{"group", times.groups}};
   factors.insert(factors.end(), times.conditions.begin(), times.conditions.end());
   factors.push_back({"shape", times.shapes});
-  std::vector<std::string> names;
-  for (const WithinFactor& factor : factors) names.push_back(factor.name);
-  for (Product effect = 1; effect < 1U << factors.size(); ++effect) {
-    MatrixXd rows = MatrixXd::Ones(1, 1);
-    for (std::size_t i = 0; i < factors.size(); ++i) {
-      const auto levels = static_cast<Index>(factors[i].levels);
-      rows = kronecker(rows, has(effect, i)
-                                 ? helmert_contrasts(levels)
-                                 : MatrixXd::Constant(1, levels, 1 / static_cast<double>(levels)));
-    }
-    if (rows.rows() > 0)
-      out.effects.push_back(tested.joint(weights.ordered(rows), name_of(effect, names)));
-  }
+  for (const DesignEffect& effect : design_effects(factors))
+    out.effects.push_back(tested.joint(weights.ordered(effect.rows), effect.name));
 }
 
-GroupContrast contrast_of(const ModelEstimate& found) {
-  GroupContrast out;
+void put_estimate(const ModelEstimate& found, GroupContrast& out) {
   out.undefined = found.undefined;
   out.estimate = found.estimate;
   out.se = found.se;
@@ -212,7 +181,6 @@ GroupContrast contrast_of(const ModelEstimate& found) {
   out.t = found.t;
   out.p = found.p;
   out.ci95 = found.ci95;
-  return out;
 }
 
 void put_means(const DesignedTimes& times, WithinContrasts within, const CellWeights& weights,
@@ -221,35 +189,15 @@ void put_means(const DesignedTimes& times, WithinContrasts within, const CellWei
       compared_conditions(times.conditions, times.conditions.size());
   for (std::size_t group = 0; group < times.groups; ++group) {
     for (const auto& condition : compared.means)
-      out.means.push_back({group, condition, tested(weights.mean(group, condition))});
+      out.means.push_back({group, condition,
+                           tested(weights.over_shapes(condition_weights(
+                               times.groups, times.conditions, group, condition)))});
   }
-  const auto difference = [&](std::size_t group, const DesignCondition& condition) -> VectorXd {
-    return weights.mean(group, condition) -
-           weights.mean(group, DesignCondition{condition.factor, 0});
-  };
-  const auto add = [&](const VectorXd& of, std::size_t group,
-                       const std::optional<DesignCondition>& condition) -> GroupContrast& {
-    GroupContrast& made = out.contrasts.emplace_back(contrast_of(tested(of)));
-    made.group = group;
-    made.condition = condition;
-    return made;
-  };
-  for (std::size_t group = 1; group < times.groups; ++group) {
-    for (const auto& condition : compared.means)
-      add(weights.mean(group, condition) - weights.mean(0, condition), group, condition);
-    for (const DesignCondition& condition : compared.differences)
-      add(difference(group, condition) - difference(0, condition), group, condition).of_difference =
-          true;
+  for (DesignContrast& one : design_contrasts(times.groups, times.conditions, within)) {
+    put_estimate(tested(weights.over_shapes(one.weights)), one.contrast);
+    out.contrasts.push_back(std::move(one.contrast));
   }
-  adjust_contrasts(out.contrasts, 0);
-  const std::size_t first = out.contrasts.size();
-  for (std::size_t group = 0; within == WithinContrasts::added && group < times.groups; ++group) {
-    for (const DesignCondition& condition : compared.differences) {
-      GroupContrast& made = add(difference(group, condition), group, condition);
-      made.of_difference = made.within = true;
-    }
-  }
-  adjust_contrasts(out.contrasts, first);
+  adjust_contrasts(out.contrasts);
 }
 
 }  // namespace
@@ -270,10 +218,10 @@ DesignModel design_model(const DesignedTimes& times, WithinContrasts contrasts) 
   out.undefined = why_not_fitted(data, times);
   if (!out.undefined.empty()) return out;
   const Fit fit = fitted(data, times);
-  std::vector<std::string> names;
-  for (const WithinFactor& factor : times.conditions) names.push_back(factor.name);
-  for (const Product one : fit.slopes) out.slopes.push_back(name_of(one, names));
-  for (const Product one : fit.taken_out) out.taken_out.push_back(name_of(one, names));
+  for (const FactorProduct one : fit.slopes)
+    out.slopes.push_back(product_name(one, times.conditions));
+  for (const FactorProduct one : fit.taken_out)
+    out.taken_out.push_back(product_name(one, times.conditions));
   if (!fit.optimum.converged) {
     out.undefined = "the fit did not converge";
     return out;

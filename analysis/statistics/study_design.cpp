@@ -5,9 +5,9 @@
 #include <cstddef>
 #include <map>
 #include <optional>
-#include <set>
 #include <string>
 
+#include "analysis/statistics/crossed_stimuli.h"
 #include "analysis/statistics/task_analysis.h"
 #include "data/base/cell_name.h"
 
@@ -54,54 +54,6 @@ void compare_measure(const std::vector<std::string>& tests, GroupedMeasure& meas
       measure.figures, std::max<std::size_t>(1, measure.groups.size()), sizes_of(measure.within),
       measure.crossed ? WithinContrasts::added : WithinContrasts::left_out);
   adjust_effects(tests, measure.result.anova.effects);
-}
-
-/// The factors that these stimuli cross completely, and what they cross: the index of each cell's
-/// stimulus, the last factor's levels innermost, the plain stimuli innermost of all.
-struct CrossedStimuli {
-  std::vector<StudyFactor> factors;
-  std::vector<std::string> plain;
-  std::vector<std::size_t> cells;
-};
-
-/// none: they cross nothing, or not completely.
-std::optional<CrossedStimuli> crossed_stimuli(const std::vector<std::string>& stimuli,
-                                              const std::vector<StudyFactor>& all) {
-  CrossedStimuli out;
-  std::map<std::string, std::size_t> place;
-  std::vector<std::set<std::string>> levels(all.size());
-  for (std::size_t i = 0; i < stimuli.size(); ++i) {
-    const CellName cell = cell_name(stimuli[i]);
-    place.emplace(stimuli[i], i);
-    if (std::ranges::find(out.plain, cell.base) == out.plain.end()) out.plain.push_back(cell.base);
-    for (std::size_t f = 0; f < all.size(); ++f) {
-      if (!cell.level(all[f].name).empty()) levels[f].insert(cell.level(all[f].name));
-    }
-  }
-  std::size_t cells = out.plain.size();
-  for (std::size_t f = 0; f < all.size(); ++f) {
-    if (levels[f].empty()) continue;
-    StudyFactor& factor = out.factors.emplace_back(StudyFactor{all[f].name, {}});
-    for (const std::string& level : all[f].levels) {
-      if (levels[f].contains(level)) factor.levels.push_back(level);
-    }
-    cells *= factor.levels.size();
-  }
-  if (out.factors.empty() || cells != stimuli.size()) return std::nullopt;
-  for (std::size_t i = 0; i < cells; ++i) {
-    CellName name{out.plain[i % out.plain.size()]};
-    std::size_t rest = i / out.plain.size();
-    for (std::size_t f = out.factors.size(); f-- > 0;) {
-      const StudyFactor& factor = out.factors[f];
-      name.levels.insert(name.levels.begin(),
-                         {factor.name, factor.levels[rest % factor.levels.size()]});
-      rest /= factor.levels.size();
-    }
-    const auto at = place.find(name.text());
-    if (at == place.end()) return std::nullopt;
-    out.cells.push_back(at->second);
-  }
-  return out;
 }
 
 /// The cells of a study of shapes: renderers, then what the shapes cross.
