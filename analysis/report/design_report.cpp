@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "analysis/report/design_names.h"
 #include "analysis/statistics/task_analysis.h"
 #include "analysis/text.h"
 
@@ -14,81 +15,28 @@ namespace {
 
 using GroupJson = nlohmann::ordered_json;
 
-GroupJson number_json(const std::optional<double>& value) {
-  return value && std::isfinite(*value) ? GroupJson(*value) : GroupJson(nullptr);
-}
-
-GroupJson interval_json(const std::optional<Interval>& interval) {
-  return interval ? GroupJson{interval->low, interval->high} : GroupJson(nullptr);
-}
-
 GroupJson group_effect_json(const GroupEffect& effect) {
-  GroupJson out{{"num_df", number_json(effect.num_df)},
-                {"den_df", number_json(effect.den_df)},
-                {"f", number_json(effect.f)},
-                {"p", number_json(effect.p)},
-                {"p_holm", number_json(effect.p_holm)},
-                {"generalized_eta_squared", number_json(effect.generalized_eta_squared)}};
+  GroupJson out{{"num_df", design_number_json(effect.num_df)},
+                {"den_df", design_number_json(effect.den_df)},
+                {"f", design_number_json(effect.f)},
+                {"p", design_number_json(effect.p)},
+                {"p_holm", design_number_json(effect.p_holm)},
+                {"generalized_eta_squared", design_number_json(effect.generalized_eta_squared)}};
   if (effect.gg_epsilon) {
     out["gg_epsilon"] = *effect.gg_epsilon;
-    out["gg_p"] = number_json(effect.gg_p);
+    out["gg_p"] = design_number_json(effect.gg_p);
   }
   if (!effect.undefined.empty()) out["reason"] = effect.undefined;
   return out;
 }
 
-const std::vector<std::string>& renderers_of(const GroupedMeasure& of) {
-  return of.within.front().levels;
-}
-
-GroupJson group_json(const GroupedMeasure& of, std::size_t group) {
-  return of.groups.empty() ? GroupJson(nullptr) : GroupJson(of.groups[group]);
-}
-
-/// Adds "renderer" and, of crossed factors, "factor" and "level"; null: the mean over all.
-void put_condition(const GroupedMeasure& of, const std::optional<DesignCondition>& condition,
-                   GroupJson& out) {
-  const bool of_renderer = condition && condition->factor == 0;
-  out["renderer"] =
-      of_renderer ? GroupJson(renderers_of(of)[condition->level]) : GroupJson(nullptr);
-  if (!of.crossed) return;
-  const bool of_factor = condition && condition->factor > 0;
-  const StudyFactor* const factor = of_factor ? &of.within[condition->factor] : nullptr;
-  out["factor"] = of_factor ? GroupJson(factor->name) : GroupJson(nullptr);
-  out["level"] = of_factor ? GroupJson(factor->levels[condition->level]) : GroupJson(nullptr);
-}
-
 GroupJson marginal_json(const GroupedMeasure& of, const GroupMarginal& one) {
-  GroupJson out{{"group", group_json(of, one.group)}};
+  GroupJson out{{"group", design_group_json(of, one.group)}};
   put_condition(of, one.condition, out);
   out["n"] = one.n;
-  out["mean"] = number_json(one.mean);
-  out["se"] = number_json(one.se);
-  out["ci95"] = interval_json(one.ci95);
-  return out;
-}
-
-GroupJson contrast_json(const GroupedMeasure& of, const GroupContrast& one) {
-  GroupJson out =
-      one.within ? GroupJson{{"within", group_json(of, one.group)}}
-                 : GroupJson{{"reference", of.groups.front()}, {"compared", of.groups[one.group]}};
-  put_condition(of, one.condition, out);
-  const StudyFactor* const factor = one.of_difference ? &of.within[one.condition->factor] : nullptr;
-  const bool of_renderer = factor != nullptr && one.condition->factor == 0;
-  out["minus_renderer"] = of_renderer ? GroupJson(factor->levels.front()) : GroupJson(nullptr);
-  if (of.crossed)
-    out["minus_level"] =
-        factor != nullptr && !of_renderer ? GroupJson(factor->levels.front()) : GroupJson(nullptr);
-  out["n_reference"] = one.n_reference;
-  out["n"] = one.n;
-  out["estimate"] = number_json(one.estimate);
-  out["se"] = number_json(one.se);
-  out["ci95"] = interval_json(one.ci95);
-  out["t"] = number_json(one.t);
-  out["df"] = number_json(one.df);
-  out["p"] = number_json(one.p);
-  out["p_holm"] = number_json(one.p_holm);
-  if (!one.undefined.empty()) out["reason"] = one.undefined;
+  out["mean"] = design_number_json(one.mean);
+  out["se"] = design_number_json(one.se);
+  out["ci95"] = design_interval_json(one.ci95);
   return out;
 }
 
@@ -103,11 +51,11 @@ std::string formula_of(const GroupedMeasure& of, const DesignModel& model) {
 }
 
 GroupJson model_effect_json(const GroupEffect& effect) {
-  GroupJson out{{"num_df", number_json(effect.num_df)},
-                {"den_df", number_json(effect.den_df)},
-                {"f", number_json(effect.f)},
-                {"p", number_json(effect.p)},
-                {"p_holm", number_json(effect.p_holm)}};
+  GroupJson out{{"num_df", design_number_json(effect.num_df)},
+                {"den_df", design_number_json(effect.den_df)},
+                {"f", design_number_json(effect.f)},
+                {"p", design_number_json(effect.p)},
+                {"p_holm", design_number_json(effect.p_holm)}};
   if (!effect.undefined.empty()) out["reason"] = effect.undefined;
   return out;
 }
@@ -125,12 +73,12 @@ GroupJson model_json(const GroupedMeasure& of, const DesignModel& model) {
   out["means"] = GroupJson::array();
   for (const ModelMean& one : model.means) {
     GroupJson& mean = out["means"].emplace_back();
-    mean["group"] = group_json(of, one.group);
+    mean["group"] = design_group_json(of, one.group);
     put_condition(of, one.condition, mean);
-    mean["estimate"] = number_json(one.value.estimate);
-    mean["se"] = number_json(one.value.se);
-    mean["df"] = number_json(one.value.df_satterthwaite);
-    mean["ci95"] = interval_json(one.value.ci95);
+    mean["estimate"] = design_number_json(one.value.estimate);
+    mean["se"] = design_number_json(one.value.se);
+    mean["df"] = design_number_json(one.value.df_satterthwaite);
+    mean["ci95"] = design_interval_json(one.value.ci95);
   }
   out["contrasts"] = GroupJson::array();
   for (const GroupContrast& one : model.contrasts) {
@@ -146,7 +94,7 @@ GroupJson measure_json(const GroupedMeasure& of) {
   GroupJson out{{"measure", of.measure},  {"task", of.task},
                 {"block", of.block_name}, {"stimulus", of.shape},
                 {"unit", of.unit},        {"logarithms", of.logarithms},
-                {"groups", of.groups},    {"renderers", renderers_of(of)},
+                {"groups", of.groups},    {"renderers", renderers_of_measure(of)},
                 {"n", of.result.anova.n}};
   if (of.crossed) {
     for (const StudyFactor& factor : of.within) out["within"][factor.name] = factor.levels;
@@ -166,56 +114,6 @@ GroupJson measure_json(const GroupedMeasure& of) {
   for (const GroupContrast& one : of.result.contrasts)
     out["contrasts"].push_back(contrast_json(of, one));
   return out;
-}
-
-/// "Thresholds of 'stiffness', ball"
-std::string title_of(const GroupedMeasure& of) {
-  std::string out = of.measure == "time"       ? "Identification times"
-                    : of.measure == "accuracy" ? "Accuracy of identification"
-                                               : measure_plural(of.measure);
-  for (const std::string& part : {of.block_name, of.shape}) {
-    if (!part.empty()) out += ", " + printable(part);
-  }
-  return out;
-}
-
-/// On the scale of the figures: of logarithms their exponential.
-std::string figure_text(const GroupedMeasure& of, const std::optional<double>& value) {
-  return value ? short_number(of.logarithms ? std::exp(*value) : *value) : kMissing;
-}
-
-std::string figure_text(const GroupedMeasure& of, const std::optional<Interval>& interval) {
-  if (!interval) return kMissing;
-  return "[" + figure_text(of, std::optional(interval->low)) + ", " +
-         figure_text(of, std::optional(interval->high)) + "]";
-}
-
-/// "ray", "surface rough"
-std::string condition_name(const GroupedMeasure& of, const DesignCondition& condition) {
-  const StudyFactor& factor = of.within[condition.factor];
-  const std::string level = printable(factor.levels[condition.level]);
-  return condition.factor == 0 ? level : printable(factor.name) + " " + level;
-}
-
-std::string condition_of(const GroupedMeasure& of,
-                         const std::optional<DesignCondition>& condition) {
-  if (condition) return condition_name(of, *condition);
-  if (of.crossed) return "all cells";
-  const std::vector<std::string>& renderers = renderers_of(of);
-  return renderers.size() > 1 ? "both or all" : printable(renderers.front());
-}
-
-/// "old - young", "old / young", with what is compared; within a group "rough - smooth".
-std::string group_contrast_name(const GroupedMeasure& of, const GroupContrast& one) {
-  const std::string minus = of.logarithms ? " / " : " - ";
-  const std::string levels = one.of_difference
-                                 ? condition_name(of, *one.condition) + minus +
-                                       printable(of.within[one.condition->factor].levels.front())
-                                 : "";
-  if (one.within)
-    return levels + (of.groups.empty() ? "" : " in " + printable(of.groups[one.group]));
-  const std::string pair = printable(of.groups[one.group]) + minus + printable(of.groups.front());
-  return one.of_difference ? pair + " of " + levels : pair;
 }
 
 /// "by group, surface and size"
@@ -260,7 +158,7 @@ std::string f_test_text(const GroupEffect& effect) {
 
 std::string group_contrast_text(const GroupedMeasure& of, const GroupContrast& one) {
   std::string text = group_contrast_name(of, one);
-  const bool several = of.crossed || renderers_of(of).size() > 1;
+  const bool several = of.crossed || renderers_of_measure(of).size() > 1;
   if (!one.of_difference && several) text += ", " + condition_of(of, one.condition);
   text += ": " + figure_text(of, one.estimate) + " " + figure_text(of, one.ci95);
   if (!one.t) return text + " (" + one.undefined + ")";
@@ -272,13 +170,9 @@ std::string group_contrast_text(const GroupedMeasure& of, const GroupContrast& o
   return text;
 }
 
-std::string group_caption(const std::string& caption, const std::string& label) {
-  return label.empty() ? caption : caption + " (" + label + ")";
-}
-
 Table group_means_table(const GroupedMeasure& of, const std::string& label) {
   Table out;
-  out.caption = group_caption(title_of(of) + " " + design_words(of), label);
+  out.caption = labelled_caption(measure_title(of) + " " + design_words(of), label);
   out.header = {"Group", of.crossed ? "Condition" : "Renderer", "n",
                 of.unit.empty() ? "Mean" : "Mean (" + of.unit + ")", "95 % interval"};
   out.n_names = 2;
@@ -299,9 +193,9 @@ Table group_means_table(const GroupedMeasure& of, const std::string& label) {
 
 Table group_effects_table(const GroupedMeasure& of, const std::string& label) {
   Table out;
-  out.caption = group_caption(
-      title_of(of) + (of.groups.empty() ? ": analysis of variance of repeated measures"
-                                        : ": mixed analysis of variance"),
+  out.caption = labelled_caption(
+      measure_title(of) + (of.groups.empty() ? ": analysis of variance of repeated measures"
+                                             : ": mixed analysis of variance"),
       label);
   out.header = {
       "Effect", "df", "F", "p", "p (Greenhouse-Geisser)", "p (Holm)", "Generalised eta squared"};
@@ -339,7 +233,8 @@ std::vector<std::string> model_notes(const GroupedMeasure& of) {
 /// The mixed model's effects; without rows if there is none.
 Table group_model_table(const GroupedMeasure& of, const std::string& label) {
   Table out;
-  out.caption = group_caption(title_of(of) + ": linear mixed model of single trials", label);
+  out.caption =
+      labelled_caption(measure_title(of) + ": linear mixed model of single trials", label);
   out.header = {"Effect", "df", "F", "p", "p (Holm)"};
   if (!of.model) return out;
   for (const GroupEffect& one : of.model->effects) {
@@ -353,11 +248,12 @@ Table group_model_table(const GroupedMeasure& of, const std::string& label) {
 
 Table group_contrasts_table(const GroupedMeasure& of, const std::string& label) {
   Table out;
-  out.caption = group_caption(title_of(of) + (!of.crossed         ? ": groups compared (Welch's t)"
-                                              : of.groups.empty() ? ": levels compared (paired t)"
-                                                                  : ": groups and levels compared "
-                                                                    "(Welch's t, paired t)"),
-                              label);
+  out.caption =
+      labelled_caption(measure_title(of) + (!of.crossed         ? ": groups compared (Welch's t)"
+                                            : of.groups.empty() ? ": levels compared (paired t)"
+                                                                : ": groups and levels compared "
+                                                                  "(Welch's t, paired t)"),
+                       label);
   out.header = {"Contrast",
                 of.crossed ? "Condition" : "Renderer",
                 of.logarithms ? "Ratio" : "Difference",
@@ -443,7 +339,7 @@ void put_design(const StudyTable& table, const std::vector<GroupedMeasure>& meas
 std::string design_text(const std::vector<GroupedMeasure>& measures) {
   std::string text;
   for (const GroupedMeasure& one : measures) {
-    text += title_of(one) + " " + design_words(one) + " (" + sizes_text(one) + ")\n";
+    text += measure_title(one) + " " + design_words(one) + " (" + sizes_text(one) + ")\n";
     if (!one.result.anova.undefined.empty()) text += "  " + one.result.anova.undefined + "\n";
     for (const GroupMarginal& mean : one.result.marginals) {
       text += "  " + (one.groups.empty() ? "" : printable(one.groups[mean.group]) + ", ") +
@@ -511,8 +407,8 @@ std::string design_conclusion(const std::vector<GroupedMeasure>& measures,
     return std::string(crossed ? "No effect of the design is clear ("
                                : "No effect of the group is clear (") +
            count + " effects; the least " + p_phrase(*adjusted[best]) + ", Holm).";
-  return finding_of(title_of(*candidates[best].measure), candidates[best].effect->name) + " (" +
-         p_phrase(*adjusted[best]) + " adjusted over " + count + " effects, Holm).";
+  return finding_of(measure_title(*candidates[best].measure), candidates[best].effect->name) +
+         " (" + p_phrase(*adjusted[best]) + " adjusted over " + count + " effects, Holm).";
 }
 
 }  // namespace palpate::analysis

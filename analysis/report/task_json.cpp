@@ -6,6 +6,7 @@
 #include <string>
 #include <variant>
 
+#include "analysis/report/answer_model_report.h"
 #include "analysis/report/design_report.h"
 #include "analysis/report/report.h"
 #include "analysis/report/task_tables.h"
@@ -675,6 +676,8 @@ std::string task_report_json(const StudyAnalysis& analysis, const std::string& p
     out["group_comparisons"].push_back(group_comparison_json(one));
   out.update(named_json(analysis));
   put_design(analysis.table, analysis.by_design, out);
+  if (analysis.functions.answer_model)
+    out["answer_models"] = answer_models_json(analysis.answer_models);
   if (analysis.identification)
     out["identification"] = read_ordered_json(report_json(*analysis.identification));
   return out.dump(1, ' ', false, TaskJson::error_handler_t::replace) + "\n";

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "analysis/figures/figures.h"
+#include "analysis/report/answer_model_report.h"
 #include "analysis/report/design_report.h"
 #include "analysis/report/html_page.h"
 #include "analysis/report/report.h"
@@ -93,6 +94,7 @@ class TaskPage {
     put_header();
     put_people();
     put_groups();
+    put_answer_models();
     put_results();
     put_figures(true);
     put_cells();
@@ -131,6 +133,14 @@ class TaskPage {
     page_.begin_section("groups", "Groups of participants", "Groups");
     for (const Figure& figure : between_figures(analysis_)) page_.put_figure(figure);
     for (const Table& table : design_tables(analysis_.by_design, label_))
+      put_table(page_.body(), table);
+    page_.end_section();
+  }
+
+  void put_answer_models() {
+    if (analysis_.answer_models.empty()) return;
+    page_.begin_section("answers", "Mixed model of all answers", "All answers");
+    for (const Table& table : answer_model_tables(analysis_.answer_models, label_))
       put_table(page_.body(), table);
     page_.end_section();
   }

@@ -3,6 +3,7 @@
 #include <string>
 #include <variant>
 
+#include "analysis/report/answer_model_report.h"
 #include "analysis/report/design_report.h"
 #include "analysis/report/report.h"
 #include "analysis/report/task_tables.h"
@@ -426,7 +427,7 @@ std::string task_report_text(const StudyAnalysis& analysis) {
   if (!analysis.table.warnings.empty()) text += "\n";
   for (const TaskCell& cell : analysis.cells) text += cell_text(cell);
   for (const TaskGroup& group : analysis.groups) text += group_text(group);
-  text += design_text(analysis.by_design);
+  text += design_text(analysis.by_design) + answer_models_text(analysis.answer_models);
   text += group_detection_text(analysis) + group_model_text(analysis);
   for (const TaskComparison& one : analysis.renderers) text += comparison_text(one, true);
   for (const TaskComparison& one : analysis.conditions) text += comparison_text(one, false);

@@ -25,20 +25,6 @@ std::optional<double> share_correct(const ParticipantCell& cell) {
   return static_cast<double>(cell.n_correct) / static_cast<double>(cell.n_trials);
 }
 
-std::vector<WithinFactor> sizes_of(const std::vector<StudyFactor>& within) {
-  std::vector<WithinFactor> out;
-  out.reserve(within.size());
-  for (const StudyFactor& factor : within) out.push_back({factor.name, factor.levels.size()});
-  return out;
-}
-
-/// The participants that the groups, if there are any, do not leave out.
-std::optional<std::size_t> known_group(const GroupLabels& labels, const std::string& participant) {
-  if (labels.names.empty()) return 0;
-  const auto known = labels.of.find(participant);
-  return known == labels.of.end() ? std::nullopt : std::optional(known->second);
-}
-
 /// Adjusts the p of the effects that the study is about. \param tests  empty: all
 void adjust_effects(const std::vector<std::string>& tests, std::vector<GroupEffect>& effects) {
   std::vector<std::optional<double>> p;
@@ -50,9 +36,10 @@ void adjust_effects(const std::vector<std::string>& tests, std::vector<GroupEffe
 }
 
 void compare_measure(const std::vector<std::string>& tests, GroupedMeasure& measure) {
-  measure.result = compare_groups(
-      measure.figures, std::max<std::size_t>(1, measure.groups.size()), sizes_of(measure.within),
-      measure.crossed ? WithinContrasts::added : WithinContrasts::left_out);
+  measure.result =
+      compare_groups(measure.figures, std::max<std::size_t>(1, measure.groups.size()),
+                     factor_sizes(measure.within),
+                     measure.crossed ? WithinContrasts::added : WithinContrasts::left_out);
   adjust_effects(tests, measure.result.anova.effects);
 }
 
@@ -105,7 +92,7 @@ DesignModel model_of_times(const Analysis& analysis, const StudyTable& table) {
   DesignedTimes times;
   times.shapes = cells.within.back().levels.size();
   cells.within.pop_back();
-  times.conditions = sizes_of(cells.within);
+  times.conditions = factor_sizes(cells.within);
   times.groups = std::max<std::size_t>(1, table.group_labels.names.size());
   for (const auto& renderer : analysis.description.participant_cells) {
     for (std::size_t i = 0; i < cells.shapes.size(); ++i) {
@@ -204,6 +191,19 @@ std::vector<MeasureOfTask> measures_of_tasks(const std::vector<TaskGroup>& group
 }
 
 }  // namespace
+
+std::vector<WithinFactor> factor_sizes(const std::vector<StudyFactor>& within) {
+  std::vector<WithinFactor> out;
+  out.reserve(within.size());
+  for (const StudyFactor& factor : within) out.push_back({factor.name, factor.levels.size()});
+  return out;
+}
+
+std::optional<std::size_t> known_group(const GroupLabels& labels, const std::string& participant) {
+  if (labels.names.empty()) return 0;
+  const auto known = labels.of.find(participant);
+  return known == labels.of.end() ? std::nullopt : std::optional(known->second);
+}
 
 bool is_tested(const std::vector<std::string>& tests, const std::string& effect) {
   return tests.empty() || std::ranges::find(tests, effect) != tests.end();

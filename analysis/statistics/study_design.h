@@ -2,6 +2,7 @@
 // The measures of a study by its design: compared between groups of participants and between the
 // cells of crossed factors. Times and accuracy of identification, and the figures of each task.
 
+#include <cstddef>
 #include <optional>
 #include <string>
 #include <vector>
@@ -31,6 +32,11 @@ struct GroupedMeasure {
   /// Of the logarithms of single times; none: another measure.
   std::optional<DesignModel> model;
 };
+
+std::vector<WithinFactor> factor_sizes(const std::vector<StudyFactor>& within);
+
+/// A participant's group, 0 without groups; none: the groups leave the participant out.
+std::optional<std::size_t> known_group(const GroupLabels& labels, const std::string& participant);
 
 /// Whether an effect belongs to the family that the protocols name. \param tests  empty: all do
 bool is_tested(const std::vector<std::string>& tests, const std::string& effect);

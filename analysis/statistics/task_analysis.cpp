@@ -816,6 +816,7 @@ StudyAnalysis analyze_study(StudyTable table, const FunctionSettings& functions,
   if (auto times = std::exchange(result.table.times, std::nullopt))
     result.identification = analyze(std::move(*times), settings, program_version);
   result.by_design = measures_by_design(result);
+  if (functions.answer_model) result.answer_models = answer_models(result, *functions.answer_model);
   return result;
 }
 

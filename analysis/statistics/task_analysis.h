@@ -9,6 +9,7 @@
 
 #include "analysis/input/study_table.h"
 #include "analysis/statistics/analysis.h"
+#include "analysis/statistics/answer_model.h"
 #include "analysis/statistics/discrimination.h"
 #include "analysis/statistics/field_analysis.h"
 #include "analysis/statistics/mixed_model.h"
@@ -139,7 +140,7 @@ struct Track {
 /// The tracks with more than one trial among a participant's trials in a cell.
 std::vector<Track> tracks_of(const std::vector<const StudyTrial*>& trials, const StudyTable& table);
 
-/// Settings of psychometric functions and their goodness of fit.
+/// Settings of psychometric functions, their goodness of fit and what else is made of answers.
 struct FunctionSettings {
   protocols::PsychometricShape shape = protocols::PsychometricShape::logistic;
   /// Of the levels; Weibull functions: not linear. None: log10 of Weibull functions, of blocks
@@ -148,6 +149,7 @@ struct FunctionSettings {
   std::optional<protocols::LevelScale> scale;
   int simulations = 199;  ///< of each goodness of fit; 0: without p
   std::uint64_t seed = 2026;
+  std::optional<AnswerModelSettings> answer_model;  ///< none: without a mixed model of answers
 };
 
 /// Figures from a participant's function, for any task. PSE: of two intervals with levels on both
@@ -218,7 +220,8 @@ struct StudyAnalysis {
   std::vector<TaskGroup> groups;
   std::vector<TaskComparison> renderers, conditions;
   TaskGroupResults group_models;
-  std::vector<GroupedMeasure> by_design;  ///< empty: the study has neither groups nor factors
+  std::vector<GroupedMeasure> by_design;   ///< empty: the study has neither groups nor factors
+  std::vector<AnswerModel> answer_models;  ///< if they are wanted
   /// Times and accuracy of identification, over all its blocks; none: no identification.
   std::optional<Analysis> identification;
 };

@@ -44,6 +44,15 @@ void check(const boost::program_options::variables_map& values,
   }
   if (values.count("design") && !values.count("csv"))
     throw UsageError("--design: is of a table of tasks; give --csv FILE");
+  if (!values.count("glmm") && !values["bootstrap"].defaulted())
+    throw UsageError("--bootstrap: is of the mixed model of answers; give --glmm");
+  const auto studies = values["bootstrap"].as<std::size_t>();
+  if (studies != 0 && (studies < 100 || studies > 100000))
+    throw UsageError("--bootstrap: expected 0, or 100 to 100000 simulated studies");
+  for (const char* other : {"sweep", "movement", "cues"}) {
+    if (values.count("glmm") && values.count(other))
+      throw UsageError("--glmm: does not go with --" + std::string(other));
+  }
   if (values.count("pattern") && !values.count("sweep"))
     throw UsageError("--pattern: is looked for in a sweep; give --sweep FILE");
   if (values.count("sweep") && !values["too-fast-s"].defaulted())
@@ -79,6 +88,11 @@ analysis::FunctionSettings function_settings(const boost::program_options::varia
   } else if (function != "logistic") {
     throw UsageError("--function: expected logistic, normal or weibull, found '" +
                      printable(function) + "'");
+  }
+  if (values.count("glmm")) {
+    settings.answer_model.emplace();
+    settings.answer_model->bootstrap = values["bootstrap"].as<std::size_t>();
+    settings.answer_model->jobs = std::max(1u, std::thread::hardware_concurrency());
   }
   if (values.count("scale") == 0) return settings;
   if (scale != "linear" && scale != "log")
@@ -178,6 +192,7 @@ int analyze_command(const std::vector<std::string>& args) {
   line.usage =
       "palpate analyze (--db FILE | --csv FILE | --sweep FILE [--pattern EXPR]) [--protocol NAME]\n"
       "       [--function logistic|normal|weibull] [--scale linear|log]\n"
+      "       [--glmm [--bootstrap N]]\n"
       "       [--json FILE] [--report FILE.html] [--figures DIR] [--force]\n"
       "palpate analyze --db FILE --movement [--protocol NAME] [--movement-csv FILE]\n"
       "       [--cutoff-hz F] [--jobs J] [--meshes DIR] [--json FILE] [--report FILE.html]\n"
@@ -193,6 +208,7 @@ int analyze_command(const std::vector<std::string>& args) {
       "their causes (Sobol indices of a saltelli design, rank correlations of others).\n"
       "For protocols of version 2 (databases, exports with a column 'task'): thresholds, PSE and\n"
       "JND, d', magnitude estimation, adjustment, information and confidence, by task.\n"
+      "With --glmm: one mixed model of all answers besides, with PSE and JND of every cell.\n"
       "With --movement: measures of the hand's movement (path, speed, smoothness, contact,\n"
       "force, strokes, procedures, coverage), from the servo samples of a database.\n"
       "With --cues: weights of what is seen and felt, JNDs with one cue and with both, and rival\n"
@@ -203,6 +219,7 @@ int analyze_command(const std::vector<std::string>& args) {
       "      (data of others: participant_id, session, block, trial, renderer, shape, response,\n"
       "      correct and response_time suffice)\n"
       "  palpate analyze --db thresholds.db --function weibull\n"
+      "  palpate analyze --db thresholds.db --glmm --report report.html\n"
       "  palpate analyze --db study.db --movement --movement-csv movement.csv\n"
       "  palpate analyze --db study.db --movement --report movement.html --figures figures\n"
       "  palpate analyze --db size.db --cues --report cues.html\n"
@@ -237,6 +254,14 @@ int analyze_command(const std::vector<std::string>& args) {
       "psychometric function of tasks: logistic, normal or weibull");
   add("scale", po::value(&scale)->value_name("NAME"),
       "of the levels of psychometric functions: linear or log; default: the procedure's");
+  add("glmm",
+      "of comparisons and detections: one mixed model of all answers, probit(answer) ~ level * "
+      "group * renderer * factors + (1 + level | participant)");
+  add("bootstrap",
+      po::value<std::size_t>()
+          ->default_value(analysis::AnswerModelSettings{}.bootstrap)
+          ->value_name("N"),
+      "with --glmm: simulated studies for its intervals, 0 or 100 to 100000");
   movement::MovementRequest movement;
   movement.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   std::string movement_csv;
@@ -287,8 +312,9 @@ int analyze_command(const std::vector<std::string>& args) {
   }
   study::Study study = study::read_study({database, csv, protocol, protocols_in(design)},
                                          outputs.wanted("report") || outputs.wanted("figures"));
-  if (study.table.trials.empty() && (!(*values)["function"].defaulted() || values->count("scale")))
-    throw UsageError("--function, --scale: there are no tasks with psychometric functions");
+  if (study.table.trials.empty() &&
+      (!(*values)["function"].defaulted() || values->count("scale") || values->count("glmm")))
+    throw UsageError("--function, --scale, --glmm: there are no tasks with psychometric functions");
   const analysis::StudyAnalysis analysis =
       analysis::analyze_study(std::move(study.table), functions, settings, PALPATE_VERSION);
   put(outputs, analysis, study.record);
