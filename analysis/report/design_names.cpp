@@ -4,7 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "analysis/report/tables.h"
-#include "analysis/statistics/task_comparisons.h"
+#include "analysis/statistics/task_analysis.h"
 #include "analysis/text.h"
 
 namespace palpate::analysis {

@@ -40,6 +40,9 @@ GroupJson marginal_json(const GroupedMeasure& of, const GroupMarginal& one) {
   return out;
 }
 
+/// Whether the model is of participants' figures, each with its error; else of single trials.
+bool is_weighted(const GroupedMeasure& of) { return of.measure != "time"; }
+
 /// "log(response_time) ~ group * renderer * shape + (1 + renderer | participant)"
 std::string formula_of(const GroupedMeasure& of, const DesignModel& model) {
   std::string fixed = of.groups.empty() ? "" : "group", random = "1";
@@ -47,7 +50,10 @@ std::string formula_of(const GroupedMeasure& of, const DesignModel& model) {
     if (factor.levels.size() > 1) fixed += (fixed.empty() ? "" : " * ") + factor.name;
   }
   for (const std::string& slope : model.slopes) random += " + " + slope;
-  return "log(response_time) ~ " + fixed + " + (" + random + " | participant)";
+  if (fixed.empty()) fixed = "1";
+  const std::string value = is_weighted(of) ? of.measure : "response_time";
+  return (of.logarithms ? "log(" + value + ")" : value) + " ~ " + fixed + " + (" + random +
+         " | participant)";
 }
 
 GroupJson model_effect_json(const GroupEffect& effect) {
@@ -65,6 +71,12 @@ GroupJson model_json(const GroupedMeasure& of, const DesignModel& model) {
                 {"n_observations", model.n_observations},
                 {"n_participants", model.n_participants},
                 {"slopes_taken_out", model.taken_out}};
+  if (is_weighted(of)) {
+    out.erase("slopes_taken_out");
+    out["participant_sd"] = design_number_json(model.participant_sd);
+    out["common_sd"] = design_number_json(model.common_sd);
+    out["n_without_error"] = model.n_without_error;
+  }
   if (!model.undefined.empty()) out["reason"] = model.undefined;
   if (!model.singular.empty()) out["singular"] = model.singular;
   out["effects"] = GroupJson::object();
@@ -215,9 +227,21 @@ Table group_effects_table(const GroupedMeasure& of, const std::string& label) {
   return out;
 }
 
+std::vector<std::string> weighted_notes(const GroupedMeasure& of, const DesignModel& model) {
+  std::vector<std::string> out{
+      printable(formula_of(of, model)) +
+      ", weighted by 1 / (se^2 + a common variance), REML, type III; degrees of freedom: "
+      "participants less groups."};
+  if (model.n_without_error > 0)
+    out.push_back(counted(model.n_without_error, "figure", "figures") +
+                  " with an open interval left out.");
+  return out;
+}
+
 /// What the mixed model is, and what was taken out of it.
 std::vector<std::string> model_notes(const GroupedMeasure& of) {
   const DesignModel& model = *of.model;
+  if (is_weighted(of)) return weighted_notes(of, model);
   std::vector<std::string> out{printable(formula_of(of, model)) +
                                ", REML, type III, degrees of freedom by Satterthwaite."};
   std::string names;
@@ -233,8 +257,10 @@ std::vector<std::string> model_notes(const GroupedMeasure& of) {
 /// The mixed model's effects; without rows if there is none.
 Table group_model_table(const GroupedMeasure& of, const std::string& label) {
   Table out;
-  out.caption =
-      labelled_caption(measure_title(of) + ": linear mixed model of single trials", label);
+  out.caption = labelled_caption(
+      measure_title(of) + (is_weighted(of) ? ": mixed model weighted by standard errors"
+                                           : ": linear mixed model of single trials"),
+      label);
   out.header = {"Effect", "df", "F", "p", "p (Holm)"};
   if (!of.model) return out;
   for (const GroupEffect& one : of.model->effects) {
@@ -322,17 +348,20 @@ void put_design(const StudyTable& table, const std::vector<GroupedMeasure>& meas
   for (const GroupedMeasure& one : measures) {
     out["by_design"].push_back(measure_json(one));
     GroupJson* place = &out["effects"][one.measure];
+    GroupJson* of_model = one.model ? &out["model_effects"][one.measure] : nullptr;
     const bool several = std::ranges::any_of(measures, [&](const GroupedMeasure& other) {
       return other.measure == one.measure && other.block_name == one.block_name &&
              other.shape != one.shape;
     });
-    if (!one.block_name.empty()) place = &(*place)[one.block_name];
-    if (several) place = &(*place)[one.shape];
+    for (GroupJson** at : {&place, &of_model}) {
+      if (*at == nullptr) continue;
+      if (!one.block_name.empty()) *at = &(**at)[one.block_name];
+      if (several) *at = &(**at)[one.shape];
+    }
     for (const GroupEffect& effect : one.result.anova.effects)
       (*place)[effect.name] = group_effect_json(effect);
     for (std::size_t i = 0; one.model && i < one.model->effects.size(); ++i)
-      out["model_effects"][one.measure][one.model->effects[i].name] =
-          model_effect_json(one.model->effects[i]);
+      (*of_model)[one.model->effects[i].name] = model_effect_json(one.model->effects[i]);
   }
 }
 
@@ -349,7 +378,8 @@ std::string design_text(const std::vector<GroupedMeasure>& measures) {
     for (const GroupEffect& effect : one.result.anova.effects)
       text += "  " + effect.name + ": " + f_test_text(effect) + "\n";
     if (one.model && !one.model->effects.empty()) {
-      text += "  mixed model of single trials\n";
+      text += is_weighted(one) ? "  mixed model weighted by standard errors\n"
+                               : "  mixed model of single trials\n";
       for (const std::string& note : model_notes(one)) text += "    " + note + "\n";
     }
     for (std::size_t i = 0; one.model && i < one.model->effects.size(); ++i)

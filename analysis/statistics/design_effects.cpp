@@ -5,10 +5,23 @@
 #include "analysis/statistics/anova.h"
 
 namespace palpate::analysis {
+namespace {
 
 using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
+
+void put_estimate(const ModelEstimate& found, GroupContrast& out) {
+  out.undefined = found.undefined;
+  out.estimate = found.estimate;
+  out.se = found.se;
+  out.df = found.df_satterthwaite;
+  out.t = found.t;
+  out.p = found.p;
+  out.ci95 = found.ci95;
+}
+
+}  // namespace
 
 bool has_factor(FactorProduct product, std::size_t factor) { return (product >> factor & 1) != 0; }
 
@@ -82,6 +95,22 @@ std::vector<DesignContrast> design_contrasts(std::size_t groups,
     }
   }
   return out;
+}
+
+void put_means(std::size_t groups, const std::vector<WithinFactor>& within,
+               WithinContrasts contrasts,
+               const std::function<ModelEstimate(const VectorXd&)>& estimate, DesignModel& out) {
+  const ComparedConditions compared = compared_conditions(within, within.size());
+  for (std::size_t group = 0; group < groups; ++group) {
+    for (const auto& condition : compared.means)
+      out.means.push_back(
+          {group, condition, estimate(condition_weights(groups, within, group, condition))});
+  }
+  for (DesignContrast& one : design_contrasts(groups, within, contrasts)) {
+    put_estimate(estimate(one.weights), one.contrast);
+    out.contrasts.push_back(std::move(one.contrast));
+  }
+  adjust_contrasts(out.contrasts);
 }
 
 }  // namespace palpate::analysis

@@ -3,11 +3,13 @@
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "analysis/statistics/between_groups.h"
+#include "analysis/statistics/design_model.h"
 
 namespace palpate::analysis {
 
@@ -44,5 +46,12 @@ struct DesignContrast {
 std::vector<DesignContrast> design_contrasts(std::size_t groups,
                                              const std::vector<WithinFactor>& within,
                                              WithinContrasts contrasts);
+
+/// Puts means and contrasts into a model. \param estimate  of a combination of the means by group
+/// and condition (condition_weights)
+void put_means(std::size_t groups, const std::vector<WithinFactor>& within,
+               WithinContrasts contrasts,
+               const std::function<ModelEstimate(const Eigen::VectorXd&)>& estimate,
+               DesignModel& out);
 
 }  // namespace palpate::analysis

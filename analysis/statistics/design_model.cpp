@@ -173,33 +173,6 @@ void put_effects(const DesignedTimes& times, const CellWeights& weights, const M
     out.effects.push_back(tested.joint(weights.ordered(effect.rows), effect.name));
 }
 
-void put_estimate(const ModelEstimate& found, GroupContrast& out) {
-  out.undefined = found.undefined;
-  out.estimate = found.estimate;
-  out.se = found.se;
-  out.df = found.df_satterthwaite;
-  out.t = found.t;
-  out.p = found.p;
-  out.ci95 = found.ci95;
-}
-
-void put_means(const DesignedTimes& times, WithinContrasts within, const CellWeights& weights,
-               const ModelTester& tested, DesignModel& out) {
-  const ComparedConditions compared =
-      compared_conditions(times.conditions, times.conditions.size());
-  for (std::size_t group = 0; group < times.groups; ++group) {
-    for (const auto& condition : compared.means)
-      out.means.push_back({group, condition,
-                           tested(weights.over_shapes(condition_weights(
-                               times.groups, times.conditions, group, condition)))});
-  }
-  for (DesignContrast& one : design_contrasts(times.groups, times.conditions, within)) {
-    put_estimate(tested(weights.over_shapes(one.weights)), one.contrast);
-    out.contrasts.push_back(std::move(one.contrast));
-  }
-  adjust_contrasts(out.contrasts);
-}
-
 }  // namespace
 
 DesignModel design_model(const DesignedTimes& times, WithinContrasts contrasts) {
@@ -230,7 +203,9 @@ DesignModel design_model(const DesignedTimes& times, WithinContrasts contrasts) 
   const ModelTester tested(data, fit.optimum.point);
   const CellWeights weights(times, cells);
   put_effects(times, weights, tested, out);
-  put_means(times, contrasts, weights, tested, out);
+  put_means(
+      times.groups, times.conditions, contrasts,
+      [&](const VectorXd& one) { return tested(weights.over_shapes(one)); }, out);
   return out;
 }
 

@@ -30,7 +30,8 @@ struct ModelMean {
   ModelEstimate value;
 };
 
-/// log(time) ~ group * conditions * shape + (1 + conditions | participant).
+/// Of times log(time) ~ group * conditions * shape + (1 + conditions | participant); of figures see
+/// weighted_model.h.
 struct DesignModel {
   std::string undefined;  ///< reason if there is no fit; empty: fitted
   std::string singular;   ///< what does not vary although no slope is left; empty: all do
@@ -45,6 +46,10 @@ struct DesignModel {
   std::vector<GroupEffect> effects;
   std::vector<ModelMean> means;          ///< estimated marginal means, as those of BetweenGroups
   std::vector<GroupContrast> contrasts;  ///< of these, as those of BetweenGroups
+  /// Of weighted figures: standard deviation of participants, and that of what is common to all
+  /// figures besides the error of each.
+  std::optional<double> participant_sd, common_sd;
+  std::size_t n_without_error = 0;  ///< weighted figures without a standard error: left out
 };
 
 /// \param contrasts  within groups as well

@@ -9,6 +9,7 @@
 
 #include "analysis/statistics/crossed_stimuli.h"
 #include "analysis/statistics/task_analysis.h"
+#include "analysis/statistics/weighted_model.h"
 #include "data/base/cell_name.h"
 
 namespace palpate::analysis {
@@ -114,6 +115,28 @@ struct MeasureOfTask {
   std::vector<const TaskGroup*> cells;
 };
 
+constexpr double kNormal975 = 1.9599639845400545;
+
+/// From the interval of a figure; none: it is open.
+std::optional<double> error_of(const NamedFigure& figure, bool logarithms) {
+  if (!figure.ci95) return std::nullopt;
+  const double low = logarithms ? std::log(figure.ci95->low) : figure.ci95->low;
+  const double high = logarithms ? std::log(figure.ci95->high) : figure.ci95->high;
+  const double error = (high - low) / (2 * kNormal975);
+  return std::isfinite(error) && error > 0 ? std::optional(error) : std::nullopt;
+}
+
+/// The weighted model of figures, if they have intervals. \param figures  all of the measure
+void put_weighted_model(const std::vector<WeightedFigure>& figures, std::size_t without_error,
+                        const std::vector<std::string>& tests, GroupedMeasure& out) {
+  if (figures.empty()) return;
+  out.model =
+      weighted_model(figures, std::max<std::size_t>(1, out.groups.size()), factor_sizes(out.within),
+                     out.crossed ? WithinContrasts::added : WithinContrasts::left_out);
+  out.model->n_without_error = without_error;
+  adjust_effects(tests, out.model->effects);
+}
+
 /// A measure of a task, by renderer and factors.
 GroupedMeasure task_by_design(const MeasureOfTask& task, const StudyTable& table) {
   const TaskGroup& first = *task.cells.front();
@@ -147,6 +170,8 @@ GroupedMeasure task_by_design(const MeasureOfTask& task, const StudyTable& table
     order = crossed->cells;
   }
   std::map<std::string, std::size_t> row_of;
+  std::vector<WeightedFigure> weighted;
+  std::size_t without_error = 0;
   for (std::size_t r = 0; r < renderers.size(); ++r) {
     for (std::size_t c = 0; c < order.size(); ++c) {
       const TaskGroup& cell = *task.cells[order[c]];
@@ -162,10 +187,16 @@ GroupedMeasure task_by_design(const MeasureOfTask& task, const StudyTable& table
                std::vector<std::optional<double>>(renderers.size() * order.size())});
         out.figures[row->second].values[r * order.size() + c] =
             out.logarithms ? std::log(one.value) : one.value;
+        if (const auto error = error_of(one, out.logarithms))
+          weighted.push_back({row->second, *group, r * order.size() + c,
+                              out.logarithms ? std::log(one.value) : one.value, *error});
+        else
+          ++without_error;
       }
     }
   }
   compare_measure(table.tests, out);
+  put_weighted_model(weighted, without_error, table.tests, out);
   return out;
 }
 

@@ -29,7 +29,8 @@ struct GroupedMeasure {
   bool crossed = false;                 ///< there are factors besides renderer and shape
   std::vector<GroupedFigures> figures;  ///< of every participant, the cells of `within` in order
   BetweenGroups result;
-  /// Of the logarithms of single times; none: another measure.
+  /// Of the logarithms of single times, or of figures with standard errors of their own (PSEs,
+  /// thresholds, JNDs); none: another measure.
   std::optional<DesignModel> model;
 };
 

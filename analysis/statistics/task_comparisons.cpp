@@ -119,11 +119,13 @@ void add_mixed_model(ThresholdComparison& result, const ValuesByParticipant& val
 }
 
 struct Figures {
-  std::vector<std::pair<std::string, double>> of;  ///< participant and figure
+  std::vector<NamedFigure> of;
   std::size_t n_undetermined = 0;
   bool ratios = true;  ///< they have a true zero: no level is 0 or below
 
-  void add(const std::string& participant, double value) { of.emplace_back(participant, value); }
+  void add(const std::string& participant, double value, std::optional<Interval> ci95 = {}) {
+    of.push_back({participant, value, ci95});
+  }
 };
 
 struct Measure {
@@ -132,16 +134,27 @@ struct Measure {
   const char* unit = nullptr;  ///< null: that of the levels
 };
 
+/// A figure of a function and its 95 % interval.
+struct MeasuredFigure {
+  double value = 0;
+  std::optional<Interval> ci95;
+};
+
+using FigureOfFunction = std::function<std::optional<MeasuredFigure>(const ParticipantFunction&)>;
+
+std::optional<MeasuredFigure> measured(const std::optional<double>& value,
+                                       const std::optional<Interval>& ci95) {
+  return value ? std::optional(MeasuredFigure{*value, ci95}) : std::nullopt;
+}
+
 /// Figures of functions that have them.
-Figures of_functions(
-    const TaskCell& cell,
-    const std::function<std::optional<double>(const ParticipantFunction&)>& value) {
+Figures of_functions(const TaskCell& cell, const FigureOfFunction& value) {
   Figures figures;
   for (const ParticipantFunction& one : cell.functions) {
     if (!one.counts.empty()) figures.ratios &= one.counts.front().level > 0;
-    const std::optional<double> found = value(one);
+    const auto found = value(one);
     if (!found) continue;
-    if (one.determined) figures.add(one.participant, *found);
+    if (one.determined) figures.add(one.participant, found->value, found->ci95);
     if (!one.determined) ++figures.n_undetermined;
   }
   return figures;
@@ -149,25 +162,26 @@ Figures of_functions(
 
 /// Thresholds that are neither a PSE nor relative to a standard.
 Figures thresholds(const TaskCell& cell) {
-  return of_functions(cell, [](const ParticipantFunction& one) -> std::optional<double> {
+  return of_functions(cell, [](const ParticipantFunction& one) -> std::optional<MeasuredFigure> {
     if (!one.fit.undefined.empty() || one.figures.pse || one.figures.jnd) return std::nullopt;
-    return one.fit.parameters.threshold;
+    return MeasuredFigure{one.fit.parameters.threshold, one.fit.threshold_ci95};
   });
 }
 
 Figures pses(const TaskCell& cell) {
-  return of_functions(cell, [](const ParticipantFunction& one) { return one.figures.pse; });
+  return of_functions(cell, [](const ParticipantFunction& one) {
+    return measured(one.figures.pse, one.figures.pse_ci95);
+  });
 }
 
 /// A function with the steepest slope has no JND: it is left out and counted.
-Figures figures_of_slopes(
-    const TaskCell& cell,
-    const std::function<std::optional<double>(const ParticipantFunction&)>& value) {
+Figures figures_of_slopes(const TaskCell& cell, const FigureOfFunction& value) {
   std::size_t too_steep = 0;
   Figures figures = of_functions(cell, [&](const ParticipantFunction& one) {
-    const bool none = one.fit.slope_at_bound && !cell.forced_choice && value(one);
+    auto found = value(one);
+    const bool none = one.fit.slope_at_bound && !cell.forced_choice && found;
     too_steep += none ? 1 : 0;
-    return none ? std::nullopt : value(one);
+    return none ? std::nullopt : found;
   });
   figures.n_undetermined += too_steep;
   figures.ratios = true;
@@ -175,12 +189,15 @@ Figures figures_of_slopes(
 }
 
 Figures jnds(const TaskCell& cell) {
-  return figures_of_slopes(cell, [](const ParticipantFunction& one) { return one.figures.jnd; });
+  return figures_of_slopes(cell, [](const ParticipantFunction& one) {
+    return measured(one.figures.jnd, one.figures.jnd_ci95);
+  });
 }
 
 Figures weber_fractions(const TaskCell& cell) {
-  return figures_of_slopes(
-      cell, [](const ParticipantFunction& one) { return one.figures.weber_fraction; });
+  return figures_of_slopes(cell, [](const ParticipantFunction& one) {
+    return measured(one.figures.weber_fraction, one.figures.weber_fraction_ci95);
+  });
 }
 
 Figures exponents(const TaskCell& cell) {
@@ -322,10 +339,8 @@ std::optional<TaskGroup> group_of(const std::vector<const TaskCell*>& cells,
     group.renderer = cell->renderer;
     group.n_undetermined = figures.n_undetermined;
     result.geometric &= figures.ratios;
-    for (const auto& [participant, value] : figures.of) {
-      group.participants.push_back({participant, value});
-      result.geometric &= value > 0;
-    }
+    for (const NamedFigure& one : figures.of) result.geometric &= one.value > 0;
+    group.participants = figures.of;
     if (measure.unit != nullptr)
       result.unit = measure.unit;
     else if (cell->field)
@@ -362,7 +377,7 @@ std::optional<TaskComparison> compared(const std::vector<const TaskCell*>& cells
     result.task = cell->task;
     result.logarithms &= figures.ratios;
     result.n_undetermined += figures.n_undetermined;
-    for (const auto& [participant, value] : figures.of) {
+    for (const auto& [participant, value, ci95] : figures.of) {
       const auto number = numbers.emplace(participant, numbers.size()).first->second;
       all.push_back({number, result.conditions.size(), value});
       result.logarithms &= value > 0;

@@ -51,6 +51,7 @@ struct TaskCell;
 struct NamedFigure {
   std::string participant;
   double value = 0;
+  std::optional<Interval> ci95;  ///< of a fitted function; an open end is infinite or 0
 };
 
 /// The group's value with a renderer: the mean of the participants' figures, or the group's model
