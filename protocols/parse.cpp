@@ -18,6 +18,7 @@
 #include "protocols/parse_scene.h"
 #include "protocols/parse_sight.h"
 #include "protocols/protocol.h"
+#include "protocols/parse_tool.h"
 #include "protocols/schedule.h"
 #include "protocols/tasks/parse_blocks.h"
 #include "protocols/tested_effects.h"
