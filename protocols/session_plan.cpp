@@ -6,6 +6,7 @@
 
 #include "protocols/factors.h"
 #include "protocols/groups.h"
+#include "protocols/procedures/recovery.h"
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/block_tracks.h"
 #include "protocols/tasks/block_trials.h"

@@ -10,6 +10,7 @@
 #include "data/base/random.h"
 #include "protocols/order.h"
 #include "protocols/procedures/procedure.h"
+#include "protocols/procedures/recovery.h"
 #include "protocols/schedule.h"
 #include "protocols/tasks/block_tracks.h"
 #include "protocols/tasks/block_trials.h"

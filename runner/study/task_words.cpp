@@ -13,6 +13,7 @@
 #include "data/base/cell_name.h"
 #include "data/base/random.h"
 #include "protocols/procedures/procedure.h"
+#include "protocols/procedures/recovery.h"
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
 #include "runner/output/outputs.h"
