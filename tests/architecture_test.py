@@ -159,7 +159,7 @@ PUBLIC = {
     "runner/study": "cue_study export_settings simulation_limits study_order study_trials task_words",
     "runner/serve": "loopback network page_server served_scene served_session",
     "runner/design": "design_page protocol_file rehearsal",
-    "runner/sweep": "cluster_folder cluster_job slurm swept_study",
+    "runner/sweep": "cluster_folder cluster_job design slurm swept_study",
     "runner/evidence/stability": "boundary effect_stability scene_boundary",
     "runner/evidence": "tick_meters",
     "runner/commands": "shared/command",
