@@ -1,6 +1,7 @@
 #include "protocols/parse.h"
 
 #include <algorithm>
+#include <array>
 #include <cstddef>
 #include <map>
 #include <memory>
@@ -17,6 +18,7 @@
 #include "protocols/json_document.h"
 #include "protocols/parse_scene.h"
 #include "protocols/parse_sight.h"
+#include "protocols/parse_tool.h"
 #include "protocols/protocol.h"
 #include "protocols/schedule.h"
 #include "protocols/tasks/parse_blocks.h"
@@ -28,6 +30,14 @@ namespace {
 using nlohmann::json;
 
 constexpr std::size_t kMaxLabel = 80;  // bytes of a label
+
+/// What the protocols of groups change.
+struct Patches {
+  std::vector<json> of_groups;
+  bool masked = false;  ///< names of groups
+};
+
+using CheckServo = void (*)(ObjectReader& servo, const Protocol&);
 
 /// The stimulus that a key stands for: its name, or an object of name and label. Not a string, and
 /// a fault, otherwise.
@@ -161,7 +171,7 @@ void read_stimuli(ObjectReader& reader, Protocol& protocol, const MeshFiles& fil
     ObjectReader item((*list)[i], pointer, reader.faults());
     protocol.stimuli.push_back(read_stimulus(item, protocol.material, files));
     protocol.stimuli.back().place = i;
-    if (protocol.version == 2) protocol.stimulus_texts.push_back((*list)[i].dump());
+    protocol.stimulus_texts.push_back((*list)[i].dump());
     const std::string& name = protocol.stimuli.back().name;
     if (!name.empty() && !names.insert(name).second) {
       reader.faults().add(item.pointer("name"),
@@ -202,27 +212,27 @@ void read_breaks(ObjectReader& reader, Protocol& protocol) {
   });
 }
 
-void read_texts(ObjectReader& reader, Protocol& protocol) {
-  reader.section("texts", [&](ObjectReader& section) {
-    section.text("instructions", protocol.texts.instructions);
-    section.text("practice", protocol.texts.practice);
-    section.text("break", protocol.texts.break_text);
-    section.text("end", protocol.texts.end);
-    section.text("move_away", protocol.texts.move_away);
-    section.text("ready", protocol.texts.ready);
-    section.text("go", protocol.texts.go);
-    section.text("wait", protocol.texts.wait);
-    section.text("other_key", protocol.texts.other_key);
-    if (protocol.version < 2) return;
-    section.text("next_interval", protocol.texts.next_interval);
-    section.text("answer_now", protocol.texts.answer_now);
-    section.text("type_number", protocol.texts.type_number);
-    section.text("agree", protocol.texts.agree);
-    section.text("disagree", protocol.texts.disagree);
-    section.text("other_number", protocol.texts.other_number);
-    section.text("answer_first", protocol.texts.answer_first);
-    section.text("go_home", protocol.texts.go_home);
-  });
+void read_texts(ObjectReader& section, Protocol::Texts& texts) {
+  section.text("instructions", texts.instructions);
+  section.text("practice", texts.practice);
+  section.text("break", texts.break_text);
+  section.text("end", texts.end);
+  section.text("move_away", texts.move_away);
+  section.text("ready", texts.ready);
+  section.text("go", texts.go);
+  section.text("wait", texts.wait);
+  section.text("other_key", texts.other_key);
+}
+
+void read_task_texts(ObjectReader& section, Protocol::Texts& texts) {
+  section.text("next_interval", texts.next_interval);
+  section.text("answer_now", texts.answer_now);
+  section.text("type_number", texts.type_number);
+  section.text("agree", texts.agree);
+  section.text("disagree", texts.disagree);
+  section.text("other_number", texts.other_number);
+  section.text("answer_first", texts.answer_first);
+  section.text("go_home", texts.go_home);
 }
 
 void read_session_settings(ObjectReader& reader, Protocol& protocol) {
@@ -250,12 +260,10 @@ void read_session_settings(ObjectReader& reader, Protocol& protocol) {
         section.boolean("feedback", protocol.blocks.front().feedback);
       },
       Presence::required);
-  read_texts(reader, protocol);
+  reader.section("texts", [&](ObjectReader& section) { read_texts(section, protocol.texts); });
 }
 
 void read_renderer_order(ObjectReader& reader, Protocol& protocol) {
-  protocol.renderer_order = RendererOrder::fixed;
-  if (protocol.version == 2) return;  // set by each block
   protocol.renderer_order = RendererOrder::counterbalanced;
   reader.choice("renderer_order", protocol.renderer_order,
                 {{"fixed", RendererOrder::fixed},
@@ -264,7 +272,7 @@ void read_renderer_order(ObjectReader& reader, Protocol& protocol) {
 }
 
 /// What version 1 says of the one task that it has.
-void read_identification(ObjectReader& reader, Protocol& protocol) {
+void read_identification(ObjectReader& reader, Protocol& protocol, const MeshFiles&, Patches&) {
   reader.integer("repetitions", protocol.repetitions, kRepetitions, Presence::required);
   protocol.blocks = {shapes_block(protocol)};
   reader.section("order", [&](ObjectReader& section) {
@@ -279,7 +287,8 @@ void read_identification(ObjectReader& reader, Protocol& protocol) {
 }
 
 /// Version 2: blocks of tasks, and pages.
-void read_tasks(ObjectReader& reader, Protocol& protocol, const MeshFiles& files) {
+void read_tasks(ObjectReader& reader, Protocol& protocol, const MeshFiles& files,
+                Patches& patches) {
   read_factors(reader, protocol);
   read_blocks(reader, protocol);
   read_pages(reader, protocol, files);
@@ -289,10 +298,25 @@ void read_tasks(ObjectReader& reader, Protocol& protocol, const MeshFiles& files
     section.number("max_minutes", protocol.sessions.max_minutes, {0, 1440, "min", true});
   });
   read_breaks(reader, protocol);
-  read_texts(reader, protocol);
+  reader.section("texts", [&](ObjectReader& section) {
+    read_texts(section, protocol.texts);
+    read_task_texts(section, protocol.texts);
+  });
+  read_view(reader, protocol);
+  patches.of_groups = read_groups(reader, protocol, patches.masked);
+  read_tested_effects(reader, protocol);
 }
 
-void read_apparatus(ObjectReader& reader, Protocol& protocol) {
+void accept_material_limit(ObjectReader&, const Protocol&) {}
+
+void refuse_material_limit(ObjectReader& servo, const Protocol& protocol) {
+  if (protocol.material_limit != MaterialLimit::limit) return;
+  servo.faults().add(servo.pointer("material_limit"),
+                     "expected 'refuse' in version 2: a level that the device limits would not be "
+                     "the one on record");
+}
+
+void read_apparatus(ObjectReader& reader, Protocol& protocol, CheckServo check_servo) {
   reader.section("stylus", [&](ObjectReader& section) {
     section.number("length_m", protocol.stylus.length, {0, 10, "m", true});
     section.number("grip_m", protocol.stylus.grip, {0, 10, "m"});
@@ -314,11 +338,7 @@ void read_apparatus(ObjectReader& reader, Protocol& protocol) {
     section.boolean("passivity_controller", protocol.passivity_controller);
     section.choice("material_limit", protocol.material_limit,
                    {{"refuse", MaterialLimit::refuse}, {"limit", MaterialLimit::limit}});
-    if (protocol.version == 2 && protocol.material_limit == MaterialLimit::limit) {
-      section.faults().add(section.pointer("material_limit"),
-                           "expected 'refuse' in version 2: a level that the device limits would "
-                           "not be the one on record");
-    }
+    check_servo(section, protocol);
   });
   reader.choice("torque", protocol.torque,
                 {{"required", TorqueRule::required}, {"left_out", TorqueRule::left_out}});
@@ -365,32 +385,40 @@ void check_schedule(const Protocol& protocol, FaultList& faults) {
   }
 }
 
-/// \param patches  of the groups
+void fix_renderer_order(ObjectReader&, Protocol& protocol) {
+  protocol.renderer_order = RendererOrder::fixed;  // each block has its own
+}
+
+/// What a version says in its own way, in the order of reading.
+struct VersionRules {
+  void (*read_order_of_renderers)(ObjectReader&, Protocol&);
+  void (*read_study)(ObjectReader&, Protocol&, const MeshFiles&, Patches&);
+  CheckServo check_servo;
+  void (*check)(const Protocol&, FaultList&);
+};
+
+constexpr std::array<VersionRules, 2> kVersions = {
+    {{read_renderer_order, read_identification, accept_material_limit, check_schedule},
+     {fix_renderer_order, read_tasks, refuse_material_limit, check_blocks}}};
+
 Protocol read_design(const json& root, const MeshFiles& files, FaultList& faults,
-                     std::vector<json>& patches) {
+                     Patches& patches) {
   Protocol protocol;
   ObjectReader reader(root, "", faults);
   reader.member("$schema");
   read_version(reader, protocol);
+  const VersionRules& rules = kVersions.at(static_cast<std::size_t>(protocol.version) - 1);
   reader.name("name", protocol.name);
   reader.text("title", protocol.title);
   reader.text("description", protocol.description);
   read_renderers(reader, protocol);
-  read_renderer_order(reader, protocol);
+  rules.read_order_of_renderers(reader, protocol);
   reader.section("material",
                  [&](ObjectReader& section) { read_material(section, protocol.material); });
   read_stimuli(reader, protocol, files);
-  bool masked = false;
-  if (protocol.version == 2) {
-    read_tasks(reader, protocol, files);
-    read_view(reader, protocol);
-    patches = read_groups(reader, protocol, masked);
-    read_tested_effects(reader, protocol);
-  } else {
-    read_identification(reader, protocol);
-  }
-  read_apparatus(reader, protocol);
-  read_event_codes(reader, protocol);  // for their faults: a schedule needs none
+  rules.read_study(reader, protocol, files, patches);
+  read_apparatus(reader, protocol, rules.check_servo);
+  read_event_codes(reader, protocol);  // check only; the schedule does not use them
   check_radius(reader, protocol.tool,
                std::any_of(protocol.stimuli.begin(), protocol.stimuli.end(),
                            [](const auto& stimulus) { return stimulus.object.soft.has_value(); }));
@@ -398,12 +426,12 @@ Protocol read_design(const json& root, const MeshFiles& files, FaultList& faults
   reader.seed("seed", protocol.seed);
   reader.refuse_unknown_keys();
   protocol.groups.seed = protocol.seed;
-  if (masked) protocol.groups.mask();
+  if (patches.masked) protocol.groups.mask();
   check_reaching(protocol, faults);
   if (faults.empty()) add_cells(root, files, protocol, faults);
   if (faults.empty()) add_channels(protocol);
   if (faults.empty()) check_sight(protocol, faults);
-  if (faults.empty()) (protocol.version == 2 ? check_blocks : check_schedule)(protocol, faults);
+  if (faults.empty()) rules.check(protocol, faults);
   return protocol;
 }
 
@@ -444,7 +472,7 @@ void add_group_protocols(const json& root, const std::vector<json>& patches, con
     patched.erase("groups");
     patched.erase("tests");  // of the whole study
     FaultList own(faults.file());
-    std::vector<json> none;
+    Patches none;
     auto group = std::make_shared<Protocol>();
     try {
       *group = read_design(patched, files, own, none);
@@ -477,12 +505,12 @@ Protocol parse_protocol_text(const std::string& text, const std::string& file_na
   FaultList faults(file_name);
   const json root = read_json(text, faults);
   const MeshFiles files{folder_of(file_name), stored, others};
-  std::vector<json> patches;
+  Patches patches;
   Protocol protocol = read_design(root, files, faults, patches);
   faults.throw_if_any();
   protocol.source_text = text;
   protocol.sha256 = checksum_hex(text);
-  add_group_protocols(root, patches, files, faults, protocol);
+  add_group_protocols(root, patches.of_groups, files, faults, protocol);
   return protocol;
 }
 

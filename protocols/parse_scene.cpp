@@ -18,6 +18,7 @@
 #include "protocols/parse_effects.h"
 #include "protocols/parse_sight.h"
 #include "protocols/parse_sound.h"
+#include "protocols/parse_tool.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/shapes.h"
@@ -25,86 +26,9 @@
 
 namespace palpate::protocols {
 
-// Reading of soft objects (scene.schema.json), for scenes and protocols.
-
-/// Reads the key `soft` of an object whose other keys were read. Faults objects that cannot be
-/// soft.
-void read_soft(ObjectReader& reader, stimuli::ObjectSpec& spec);
-
 namespace {
 
 using nlohmann::json;
-
-constexpr NumberRange kPlace{-10, 10, "m"};
-constexpr NumberRange kWorld{-1000, 1000, "m"};
-constexpr NumberRange kFactor{0, 100, "", true};
-constexpr double kThinnest = 0.0005;  // m; thinner than any mesh can follow
-constexpr NumberRange kRadius{0, 0.05, "m"};
-constexpr double kShortest = 1e-6;  // m: a shorter segment is a slip of the decimal point
-
-ToolSegmentSpec read_segment(ObjectReader& reader) {
-  ToolSegmentSpec segment;
-  reader.vector("from_m", segment.from, kPlace, Presence::required);
-  reader.vector("to_m", segment.to, kPlace, Presence::required);
-  reader.refuse_unknown_keys();
-  return segment;
-}
-
-}  // namespace
-
-void read_tool(ObjectReader& reader, ToolSpec& tool) {
-  reader.section("tool", [&](ObjectReader& section) {
-    section.number("radius_m", tool.radius, kRadius);
-    const json* const list =
-        section.array("segments", 1, ToolSpec::kMostSegments, Presence::required);
-    if (list == nullptr) return;
-    FaultList& faults = section.faults();
-    for (std::size_t i = 0; i < list->size(); ++i) {
-      const std::string pointer = child_pointer(section.pointer("segments"), i);
-      const std::size_t before = faults.count();
-      ObjectReader item((*list)[i], pointer, faults);
-      const ToolSegmentSpec segment = read_segment(item);
-      if (faults.count() == before && !(glm::distance(segment.from, segment.to) >= kShortest)) {
-        faults.add(item.pointer("to_m"),
-                   "expected another point than from_m, at least 1e-6 m from it: a segment has a "
-                   "length");
-      }
-      tool.segments.push_back(segment);
-    }
-  });
-}
-
-void check_radius(ObjectReader& reader, const ToolSpec& tool, bool soft) {
-  if (soft ? tool.radius == 0 || tool.radius >= kThinnest : tool.radius == 0) return;
-  reader.faults().add(
-      reader.pointer("tool") + "/radius_m",
-      soft ? "expected 0.0005 to 0.05 m, or 0 for 0.002 m: a tool on a soft object has a radius"
-           : "expected 0: objects are rigid, and rigid objects are touched by segments without "
-             "thickness");
-}
-
-void read_reach(ObjectReader& reader, std::optional<ReachSpec>& reach) {
-  reader.section("reach", [&](ObjectReader& section) {
-    ReachSpec& read = reach.emplace();
-    section.number("factor", read.factor, kFactor, Presence::required);
-    const json* const pivot = section.member("pivot");
-    if (pivot == nullptr) return;
-    if (pivot->is_array()) {
-      read.pivot = ReachSpec::Pivot::point;
-      section.vector("pivot", read.point, kWorld);
-    } else if (pivot->is_string()) {
-      read_choice(*pivot, section.pointer("pivot"), read.pivot,
-                  {{"grip", ReachSpec::Pivot::grip}, {"tail", ReachSpec::Pivot::tail}},
-                  section.faults());
-    } else {
-      section.faults().add(
-          section.pointer("pivot"),
-          "expected 'grip', 'tail' or a point [x, y, z] of the world" + found_text(*pivot));
-    }
-  });
-}
-
-namespace {
 
 constexpr NumberRange kMass{1e-6, 1e4, "kg"};
 constexpr NumberRange kDensity{0.01, 1e5, "kg/m^3"};
@@ -114,113 +38,6 @@ constexpr NumberRange kSpin{-1000, 1000, "rad/s"};
 constexpr NumberRange kBodyDamping{0, 1000, "1/s"};
 constexpr NumberRange kRestitution{0, 1};
 constexpr NumberRange kBodyFriction{0, 10};
-constexpr NumberRange kGravity{-1000, 1000, "m/s^2"};
-
-}  // namespace
-
-void read_gravity(ObjectReader& reader, Vec3& gravity) {
-  reader.vector("gravity_m_per_s2", gravity, kGravity);
-}
-
-namespace {
-
-using nlohmann::json;
-
-constexpr NumberRange kWeight{0, 1e9, "", true};
-
-std::vector<double> read_list(const json& list, const std::string& pointer,
-                              const GridLimits& limits, FaultList& faults) {
-  std::vector<double> values;
-  if (list.empty() || list.size() > limits.most) {
-    faults.add(pointer, "expected 1 to " + std::to_string(limits.most) + " numbers, found " +
-                            std::to_string(list.size()));
-    return values;
-  }
-  const std::size_t before = faults.count();
-  for (std::size_t i = 0; i < list.size(); ++i) {
-    double value = 0;
-    read_number(list[i], child_pointer(pointer, i), value, limits.range, faults);
-    if (faults.count() == before && !limits.may_repeat &&
-        std::find(values.begin(), values.end(), value) != values.end())
-      faults.add(child_pointer(pointer, i), "expected each value once" + found_text(list[i]));
-    values.push_back(value);
-  }
-  return faults.count() == before ? values : std::vector<double>();
-}
-
-std::vector<double> read_range(ObjectReader& reader, const GridLimits& limits) {
-  FaultList& faults = reader.faults();
-  const std::size_t before = faults.count();
-  double from = 0, to = 0;
-  int count = 0;
-  LevelScale spacing = LevelScale::linear;
-  reader.choice("spacing", spacing, {{"linear", LevelScale::linear}, {"log", LevelScale::log10}});
-  reader.number("from", from, limits.range, Presence::required);
-  reader.number("to", to, limits.range, Presence::required);
-  reader.integer("count", count, {2, static_cast<double>(limits.most)}, Presence::required);
-  if (faults.count() != before) return {};
-  if (!(from < to)) {
-    faults.add(reader.pointer("to"), "expected more than from");
-    return {};
-  }
-  if (spacing == LevelScale::log10 && !(from > 0)) {
-    faults.add(reader.pointer("from"), "expected more than 0 with spacing 'log'");
-    return {};
-  }
-  const double low = scale_position(spacing, from), high = scale_position(spacing, to);
-  std::vector<double> values{from};
-  for (int i = 1; i < count - 1; ++i)
-    values.push_back(level_at(spacing, low + (high - low) * i / (count - 1)));
-  values.push_back(to);
-  return values;
-}
-
-/// {"values": [...], "weights": [...]}
-ParameterGrid read_weighted(ObjectReader& reader, const GridLimits& limits) {
-  ParameterGrid grid;
-  const GridLimits weights{kWeight, limits.most, Presence::optional, true};
-  grid.values = read_grid_values(reader, "values", limits);
-  grid.weights = read_grid_values(reader, "weights", weights);
-  if (!grid.values.empty() && !grid.weights.empty() && grid.values.size() != grid.weights.size()) {
-    reader.faults().add(reader.pointer("weights"), "expected as many numbers as values, " +
-                                                       std::to_string(grid.values.size()) +
-                                                       ", found " +
-                                                       std::to_string(grid.weights.size()));
-  }
-  return grid;
-}
-
-}  // namespace
-
-std::vector<double> read_grid_values(ObjectReader& reader, const char* key,
-                                     const GridLimits& limits) {
-  const json* const value = reader.member(key, limits.presence);
-  if (value == nullptr) return {};
-  const std::string pointer = reader.pointer(key);
-  if (value->is_array()) return read_list(*value, pointer, limits, reader.faults());
-  if (value->is_object()) {
-    ObjectReader inner(*value, pointer, reader.faults());
-    std::vector<double> values = read_range(inner, limits);
-    inner.refuse_unknown_keys();
-    return values;
-  }
-  double number = 0;
-  if (!read_number(*value, pointer, number, limits.range, reader.faults())) return {};
-  return {number};
-}
-
-ParameterGrid read_grid(ObjectReader& reader, const char* key, const GridLimits& limits) {
-  ParameterGrid grid;
-  const json* const value = reader.member(key, limits.presence);
-  if (value == nullptr || !value->is_object() || !value->contains("values")) {
-    if (value != nullptr) grid.values = read_grid_values(reader, key, limits);
-    return grid;
-  }
-  reader.section(key, [&](ObjectReader& inner) { grid = read_weighted(inner, limits); });
-  return grid;
-}
-
-namespace {
 
 // The range in which coupling of body steps and servo was found stable (rendering/README.md).
 constexpr NumberRange kYoung{1e3, 1e7, "Pa"};
@@ -282,8 +99,8 @@ void refuse_with(ObjectReader& reader, bool has, const char* key, const char* wh
   if (has) reader.faults().add(reader.pointer(key), why);
 }
 
-}  // namespace
-
+/// Reads the key `soft` of an object whose other keys were read. Faults objects that cannot be
+/// soft.
 void read_soft(ObjectReader& reader, stimuli::ObjectSpec& spec) {
   const bool is_gmsh =
       spec.shape == stimuli::ShapeKind::mesh && stimuli::is_gmsh_file_name(spec.file);
@@ -324,10 +141,6 @@ void read_soft(ObjectReader& reader, stimuli::ObjectSpec& spec) {
   refuse_with(reader, !spec.material.layers.empty(), "layers",
               "expected no layers on a soft object");
 }
-
-namespace {
-
-using nlohmann::json;
 
 // Wide: a wrong unit (30 for 30 mm) is caught by the device's workspace, not here.
 constexpr NumberRange kLength{0, 1000, "m", true};

@@ -1,48 +1,15 @@
 #pragma once
-// Reading of objects, bodies, grids of numbers and tools, for scenes and protocols.
+// Reading of objects (scene.schema.json), for scenes and protocols.
 
-#include <cstddef>
 #include <memory>
-#include <optional>
 #include <string>
-#include <vector>
 
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
-#include "protocols/procedures/procedure_spec.h"
 #include "protocols/protocol.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::protocols {
-
-/// Reads the keys `tool` and `reach` of a scene or protocol.
-void read_tool(ObjectReader& reader, ToolSpec& tool);
-/// Faults a radius that nothing needs. \param soft whether an object is soft
-void check_radius(ObjectReader& reader, const ToolSpec& tool, bool soft);
-void read_reach(ObjectReader& reader, std::optional<ReachSpec>& reach);
-
-/// Reading of moving bodies (scene.schema.json), for scenes and protocols.
-/// gravity_m_per_s2.
-void read_gravity(ObjectReader& reader, Vec3& gravity);
-
-// Lists of numbers, written out or as a range.
-
-struct GridLimits {
-  NumberRange range;
-  std::size_t most = 1000;
-  Presence presence = Presence::optional;
-  bool may_repeat = false;  ///< false: each value once
-};
-
-/// A number, a list of numbers, {"from": 1, "to": 10, "count": 19, "spacing": "linear" or "log"},
-/// or
-/// {"values": [...], "weights": [...]}. Empty and a fault otherwise.
-ParameterGrid read_grid(ObjectReader& reader, const char* key, const GridLimits& limits);
-/// The same without weights.
-std::vector<double> read_grid_values(ObjectReader& reader, const char* key,
-                                     const GridLimits& limits);
-
-// Reading of scene objects (scene.schema.json), for scenes and protocols.
 
 /// Where to find the mesh files of a scene or protocol.
 struct MeshFiles {

@@ -390,16 +390,16 @@ struct Protocol {
   bool samples = false;
   std::uint64_t seed = 0;
 
-  std::vector<TaskBlock> blocks;  ///< version 1: the study of shapes alone
+  std::vector<TaskBlock> blocks;            ///< version 1: the study of shapes alone
+  std::vector<std::string> stimulus_texts;  ///< JSON of each stimulus, for its levels
   // Version 2; empty in version 1.
   bool blocks_counterbalanced = false;  ///< within a session; practice stays before its block
   std::vector<PageSpec> pages;
-  std::vector<std::string> stimulus_texts;  ///< JSON of each stimulus, for its levels
-  std::vector<Factor> factors;              ///< crossed by blocks; each cell has its own stimuli
-  GroupAssignment groups;                   ///< of participants
-  std::optional<ViewSpec> view;             ///< where the picture and the eyes are
-  std::optional<CuesSpec> cues;             ///< blocks of a study of seen and felt cues
-  std::vector<std::string> tests;           ///< effects of the confirmatory family; empty: all
+  std::vector<Factor> factors;     ///< crossed by blocks; each cell has its own stimuli
+  GroupAssignment groups;          ///< of participants
+  std::optional<ViewSpec> view;    ///< where the picture and the eyes are
+  std::optional<CuesSpec> cues;    ///< blocks of a study of seen and felt cues
+  std::vector<std::string> tests;  ///< effects of the confirmatory family; empty: all
   /// The protocol of each group, with what differs for it (groups.h). Empty: there are no groups,
   /// or this is a group's own.
   std::vector<std::shared_ptr<const Protocol>> group_protocols;

@@ -6,6 +6,7 @@
 
 #include "protocols/factors.h"
 #include "protocols/groups.h"
+#include "protocols/procedures/recovery.h"
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/block_tracks.h"
 #include "protocols/tasks/block_trials.h"
@@ -27,18 +28,53 @@ std::vector<std::vector<Trial>> shapes_of_session(const Protocol& protocol, int 
   return out;
 }
 
+/// \param trials  of a round of practice
+std::optional<PracticeCriterion> practice_criterion(const Protocol& protocol, int trials) {
+  const Protocol::Practice& practice = protocol.practice;
+  if (!practice.criterion) return std::nullopt;
+  return PracticeCriterion{static_cast<int>(std::ceil(*practice.criterion * trials)), trials,
+                           practice.max_rounds * trials, true};
+}
+
 }  // namespace
 
-std::vector<SessionPlan::Sequence> SessionPlan::sequences_of(const Protocol& protocol,
-                                                             int participant_number, int session) {
-  std::vector<Sequence> out;
-  if (const std::optional<int> shapes = study_of_shapes(protocol)) {
-    for (std::vector<Trial>& trials : shapes_of_session(protocol, participant_number, session))
-      out.push_back({*shapes, std::move(trials)});
-    return out;
+SessionPlan::Sequences SessionPlan::sequences_of_shapes(const Protocol& protocol,
+                                                        int participant_number, int session) {
+  Sequences out;
+  for (std::vector<Trial>& trials : shapes_of_session(protocol, participant_number, session)) {
+    Sequence one;
+    one.expected_trials = [size = static_cast<long long>(trials.size())] { return size; };
+    const bool warm_up = session > 1 && protocol.sessions.warm_up_trials > 0 && out.all.empty();
+    if (trials.front().practice && !warm_up)
+      one.criterion = practice_criterion(protocol, static_cast<int>(trials.size()));
+    if (out.all.empty()) out.first_block = trials.front().block;
+    one.round = [&protocol, participant_number, first = std::move(trials)](std::uint64_t round) {
+      if (round == 0) return first;
+      return practice_round(protocol, participant_number, first.front().renderer,
+                            static_cast<int>(round) + 1);
+    };
+    out.all.push_back(std::move(one));
   }
-  for (const int block : blocks_in_order(protocol, participant_number, session))
-    out.push_back({block});
+  return out;
+}
+
+SessionPlan::Sequence SessionPlan::sequence_of_block(const Protocol& protocol,
+                                                     int participant_number, int index) {
+  const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
+  const auto round = [&protocol, participant_number, index](std::uint64_t number) {
+    return trials_of_block(protocol, participant_number, index, number);
+  };
+  const auto expected = [&block] { return expected_trials_of(block); };
+  return {index, round, block.criterion, expected, most_trials_of(block)};
+}
+
+SessionPlan::Sequences SessionPlan::sequences_of(const Protocol& protocol, int participant_number,
+                                                 int session) {
+  if (study_of_shapes(protocol)) return sequences_of_shapes(protocol, participant_number, session);
+  const auto is_before = [session](const TaskBlock& block) { return block.session < session; };
+  Sequences out{1 + static_cast<int>(std::ranges::count_if(protocol.blocks, is_before))};
+  for (const int index : blocks_in_order(protocol, participant_number, session))
+    out.all.push_back(sequence_of_block(protocol, participant_number, index));
   return out;
 }
 
@@ -47,13 +83,7 @@ SessionPlan::SessionPlan(const Protocol& protocol, int participant_number, int s
       participant_number_(participant_number),
       session_(session),
       sequences_(sequences_of(*protocol_, participant_number, session)) {
-  if (!sequences_.empty() && !sequence().trials.empty()) {
-    first_block_ = sequence().trials.front().block;
-  } else {
-    first_block_ += static_cast<int>(std::ranges::count_if(
-        protocol_->blocks, [session](const TaskBlock& block) { return block.session < session; }));
-  }
-  if (!sequences_.empty()) begin_sequence();
+  if (!sequences_.all.empty()) begin_sequence();
   find_next();
 }
 
@@ -66,8 +96,7 @@ void SessionPlan::begin_sequence() {
   right_.clear();
   fixed_.clear();
   tracks_.reset();
-  criterion_ = block().criterion;
-  if (!sequence().trials.empty()) return begin_shapes();
+  criterion_ = sequence().criterion;
   if (!is_adaptive(block())) return add_round();
   std::vector<ProcedureSpec> specs;
   for (const BlockTrack& track : tracks_of(block())) specs.push_back(*track.procedure);
@@ -76,24 +105,8 @@ void SessionPlan::begin_sequence() {
       task_stream(protocol_->seed, participant_number_, stream_of(block()), kTaskTracks).next());
 }
 
-void SessionPlan::begin_shapes() {
-  fixed_ = sequence().trials;
-  rounds_ = 1;
-  const bool warm_up = session_ > 1 && protocol_->sessions.warm_up_trials > 0 && at_ == 0;
-  const Protocol::Practice& practice = protocol_->practice;
-  if (!fixed_.front().practice || warm_up || !practice.criterion) return;
-  const auto trials = static_cast<int>(fixed_.size());
-  criterion_ = {static_cast<int>(std::ceil(*practice.criterion * trials)), trials,
-                practice.max_rounds * trials, true};
-}
-
 void SessionPlan::add_round() {
-  const auto round = static_cast<int>(rounds_++);  // from 0
-  const std::vector<Trial> more =
-      sequence().trials.empty()
-          ? trials_of_block(*protocol_, participant_number_, sequence().block,
-                            static_cast<std::uint64_t>(round))
-          : practice_round(*protocol_, participant_number_, fixed_.back().renderer, round + 1);
+  const std::vector<Trial> more = sequence().round(rounds_++);
   fixed_.insert(fixed_.end(), more.begin(), more.end());
 }
 
@@ -131,26 +144,24 @@ Trial SessionPlan::adaptive_trial() const {
   trial.point = wanted.point;
   const DrawnTrial drawn = drawn_trial(*protocol_, participant_number_, sequence().block, shown_);
   trial.catch_trial = drawn.catch_trial;
+  trial.orientation = drawn.orientation;
   set_intervals(block(), drawn.position, trial);
   return trial;
 }
 
 void SessionPlan::find_next() {
   next_.reset();
-  while (at_ < sequences_.size()) {
+  while (at_ < sequences_.all.size()) {
     if (sequence_continues()) break;
-    if (++at_ < sequences_.size()) begin_sequence();
+    if (++at_ < sequences_.all.size()) begin_sequence();
   }
-  if (at_ >= sequences_.size()) return;
+  if (at_ >= sequences_.all.size()) return;
   Trial trial = tracks_ ? adaptive_trial() : fixed_[shown_];
   trial.session = session_;
-  trial.block = first_block_ + static_cast<int>(at_);
+  trial.block = sequences_.first_block + static_cast<int>(at_);
   trial.trial = static_cast<int>(done_) + 1;
   trial.practice |= block().practice;
   trial.task_block = sequence().block;
-  if (!has_order_of_shapes(block()))
-    trial.orientation =
-        orientation_in_block(*protocol_, participant_number_, block_index(), shown_);
   next_ = std::move(trial);
 }
 
@@ -205,19 +216,7 @@ void SessionPlan::answered(const TrialOutcome& outcome) {
 }
 
 long long SessionPlan::most_in_sequence() const {
-  return sequence().trials.empty() ? most_trials_of(block())
-                                   : static_cast<long long>(fixed_.size());
-}
-
-long long SessionPlan::trials_after(long long (*trials_of)(const TaskBlock&)) const {
-  long long trials = 0;
-  for (std::size_t i = at_ + 1; i < sequences_.size(); ++i) {
-    const Sequence& later = sequences_[i];
-    trials += later.trials.empty()
-                  ? trials_of(protocol_->blocks[static_cast<std::size_t>(later.block)])
-                  : static_cast<long long>(later.trials.size());
-  }
-  return trials;
+  return sequence().most_trials.value_or(static_cast<long long>(fixed_.size()));
 }
 
 std::size_t SessionPlan::expected_size() const {
@@ -232,14 +231,18 @@ std::size_t SessionPlan::expected_size() const {
   } else {
     left = most_in_sequence() - static_cast<long long>(shown_);
   }
-  left += trials_after(expected_trials_of);
+  for (std::size_t i = at_ + 1; i < sequences_.all.size(); ++i)
+    left += sequences_.all[i].expected_trials();
   return done_ + static_cast<std::size_t>(std::max(1LL, left));
 }
 
 std::size_t SessionPlan::size() const {
   if (finished()) return done_;
   long long left = most_in_sequence() - static_cast<long long>(shown_ - unanswered_);
-  left += trials_after(most_trials_of);
+  for (std::size_t i = at_ + 1; i < sequences_.all.size(); ++i) {
+    const Sequence& later = sequences_.all[i];
+    left += later.most_trials ? *later.most_trials : later.expected_trials();
+  }
   return done_ + static_cast<std::size_t>(std::max(1LL, left));
 }
 

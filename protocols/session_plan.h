@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -51,7 +52,9 @@ class SessionPlan {
   std::size_t size() const;           ///< at most, as far as known now
   std::size_t expected_size() const;  ///< likewise, if adaptive blocks take their usual course
   /// The number of its last block.
-  int last_block() const { return first_block_ + static_cast<int>(sequences_.size()) - 1; }
+  int last_block() const {
+    return sequences_.first_block + static_cast<int>(sequences_.all.size()) - 1;
+  }
   /// True at the first trial of a block.
   bool block_begins() const { return shown_ == 0; }
   /// Trials before the next one in its block.
@@ -80,16 +83,26 @@ class SessionPlan {
  private:
   /// Trials without a break.
   struct Sequence {
-    int block = 0;                   ///< index into Protocol::blocks
-    std::vector<Trial> trials = {};  ///< of the study of shapes; empty: as the block says
+    int block = 0;  ///< index into Protocol::blocks
+    /// Its trials in round 0, 1, ...; adaptive: not called.
+    std::function<std::vector<Trial>(std::uint64_t round)> round;
+    std::optional<PracticeCriterion> criterion;
+    std::function<long long()> expected_trials;
+    std::optional<long long> most_trials;  ///< none: those of its rounds
+  };
+  /// Those of a session.
+  struct Sequences {
+    int first_block = 1;  ///< number of the first
+    std::vector<Sequence> all = {};
   };
 
-  static std::vector<Sequence> sequences_of(const Protocol& protocol, int participant_number,
-                                            int session);
-  const Sequence& sequence() const { return sequences_[at_]; }
-  std::uint64_t block_index() const { return static_cast<std::uint64_t>(sequence().block); }
+  static Sequences sequences_of(const Protocol& protocol, int participant_number, int session);
+  static Sequences sequences_of_shapes(const Protocol& protocol, int participant_number,
+                                       int session);
+  static Sequence sequence_of_block(const Protocol& protocol, int participant_number, int index);
+  const Sequence& sequence() const { return sequences_.all[at_]; }
+  std::size_t block_index() const { return static_cast<std::size_t>(sequence().block); }
   void begin_sequence();
-  void begin_shapes();
   void add_round();
   bool sequence_continues();
   bool criterion_met() const;
@@ -97,14 +110,11 @@ class SessionPlan {
   int stimulus_of_shared(std::size_t track) const;
   Trial adaptive_trial() const;
   long long most_in_sequence() const;
-  /// Of the sequences after this one. \param trials_of  a block
-  long long trials_after(long long (*trials_of)(const TaskBlock&)) const;
 
   const Protocol* protocol_;
   int participant_number_, session_;
-  std::vector<Sequence> sequences_;
-  int first_block_ = 1;               ///< number of the first sequence
-  std::size_t at_ = 0;                ///< into sequences_
+  Sequences sequences_;
+  std::size_t at_ = 0;                ///< into sequences_.all
   std::size_t done_ = 0, shown_ = 0;  ///< in the session, in the sequence
   std::size_t unanswered_ = 0;        ///< in an adaptive block
   bool ended_ = false;                ///< likewise, before its procedures have

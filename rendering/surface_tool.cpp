@@ -317,12 +317,12 @@ bool SurfaceTool::parted_here(const SurfacePatch& patch) const {
 }
 
 /// Drops planes that hold nothing.
-void SurfaceTool::let_go_of_idle_planes() {
+void SurfaceTool::release_idle_planes() {
   planes_.remove_if([](const SurfacePlane& plane) { return !(plane.multiplier > 0); });
 }
 
 /// Drops planes whose patch the tool has slid off; returns whether there were any.
-bool SurfaceTool::let_go_of_slid_planes(const Vec3& at, double slack) {
+bool SurfaceTool::release_slid_planes(const Vec3& at, double slack) {
   bool slid = false;
   planes_.remove_if([&](SurfacePlane& plane) {
     if (plane.stays && parted_here(plane.patch)) return false;
@@ -433,7 +433,7 @@ bool SurfaceTool::in_the_way_at_rest(SurfacePlane& out) {
 
 /// Adds a plane to those that hold the tool.
 void SurfaceTool::take_plane(const SurfacePlane& plane) {
-  if (planes_.full()) let_go_of_idle_planes();
+  if (planes_.full()) release_idle_planes();
   stuck_ = planes_.full();
   if (!stuck_) planes_.add(plane);
 }
@@ -447,8 +447,8 @@ void SurfaceTool::move_to_hit(const Vec3& goal, const PatchHit& hit) {
   const double time = rate < 0 ? std::clamp((height - skin_) / -rate, 0.0, hit.time) : 0.0;
   at_ += time * way;
   if (time * glm::length(way) > kSamePlace * skin_) {
-    let_go_of_idle_planes();
-    let_go_of_slid_planes(at_, kSlidOff * skin_ + kOnPatch * surface_.size());
+    release_idle_planes();
+    release_slid_planes(at_, kSlidOff * skin_ + kOnPatch * surface_.size());
   }
   if (holds(plane.patch)) return;
   plane.stays = parted_here(plane.patch);
@@ -536,9 +536,9 @@ void SurfaceTool::find_rest() {
       continue;
     }
     at_ = goal;
-    let_go_of_idle_planes();
+    release_idle_planes();
     if (!find_exact_place()) break;
-    if (let_go_of_slid_planes(exact_, slack)) continue;
+    if (release_slid_planes(exact_, slack)) continue;
     if (past_a_patch_at_rest()) {
       // Beyond its border is the valley's other side, or a gap.
       const PlanesOf<SurfacePlane> sides = planes_;

@@ -92,8 +92,8 @@ class SurfaceTool {
   bool in_the_way_at_rest(SurfacePlane& plane);
   void leave_steps();
   void take_plane(const SurfacePlane& plane);
-  void let_go_of_idle_planes();
-  bool let_go_of_slid_planes(const Vec3& at, double slack);
+  void release_idle_planes();
+  bool release_slid_planes(const Vec3& at, double slack);
   double off_patch(const SurfacePlane& plane, const Vec3& at) const;
   bool past_a_patch_at_rest() const;
   bool parted_here(const SurfacePatch& patch) const;

@@ -65,8 +65,8 @@ class IdealTool {
   bool find_exact_place();
   bool in_the_way_at_rest(Plane& plane);
   void take_plane(const Plane& plane);
-  void let_go_of_idle_planes();
-  bool let_go_of_slid_planes(bool at_rest);
+  void release_idle_planes();
+  bool release_slid_planes(bool at_rest);
   bool slid_off(const Plane& plane) const;
   bool slide_on(Plane& plane);
   bool slid_off_at_rest(const Plane& plane, double slack) const;
@@ -332,7 +332,7 @@ bool IdealTool::parted_here(const NearPair& near) const {
 }
 
 /// Lets go of planes that hold nothing.
-void IdealTool::let_go_of_idle_planes() {
+void IdealTool::release_idle_planes() {
   planes_.remove_if([&](const Plane& plane) {
     if (plane.multiplier > 0) return false;
     pairs_[plane.near].carries = false;
@@ -341,7 +341,7 @@ void IdealTool::let_go_of_idle_planes() {
 }
 
 /// Lets go of planes whose facet the tool has slid off. True if there are any.
-bool IdealTool::let_go_of_slid_planes(bool at_rest) {
+bool IdealTool::release_slid_planes(bool at_rest) {
   bool slid = false;
   planes_.remove_if([&](Plane& plane) {
     NearPair& near = pairs_[plane.near];
@@ -399,7 +399,7 @@ bool IdealTool::in_the_way_at_rest(Plane& plane) {
 
 /// Puts a plane in use; its pair has no other in use.
 void IdealTool::take_plane(const Plane& plane) {
-  if (planes_.full()) let_go_of_idle_planes();
+  if (planes_.full()) release_idle_planes();
   stuck_ = planes_.full();
   if (stuck_) return;
   NearPair& near = pairs_[plane.near];
@@ -417,8 +417,8 @@ void IdealTool::move_to_hit(const Vec3& goal, std::uint32_t index, const PairCas
   const double time = rate < 0 ? std::clamp((height - group_.skin) / -rate, 0.0, hit.time) : 0.0;
   at_ += time * way;
   if (time * glm::length(way) > kSamePlace * group_.skin) {
-    let_go_of_idle_planes();
-    let_go_of_slid_planes(false);
+    release_idle_planes();
+    release_slid_planes(false);
   }
   plane.stays = parted_here(pairs_[index]);
   take_plane(plane);
@@ -450,9 +450,9 @@ void IdealTool::translate() {
       continue;
     }
     at_ = goal;
-    let_go_of_idle_planes();
+    release_idle_planes();
     if (!find_exact_place()) break;
-    if (let_go_of_slid_planes(true)) continue;
+    if (release_slid_planes(true)) continue;
     if (past_a_facet_at_rest() && !find_goal(exact_)) break;  // the gap is closed to it
     Plane in_the_way;
     if (!in_the_way_at_rest(in_the_way)) return;

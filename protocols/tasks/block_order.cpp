@@ -10,6 +10,7 @@
 #include "data/base/random.h"
 #include "protocols/order.h"
 #include "protocols/procedures/procedure.h"
+#include "protocols/procedures/recovery.h"
 #include "protocols/schedule.h"
 #include "protocols/tasks/block_tracks.h"
 #include "protocols/tasks/block_trials.h"
@@ -113,8 +114,8 @@ std::vector<int> blocks_in_order(const Protocol& protocol, int participant_numbe
 }
 
 int block_orders(const Protocol& protocol) {
-  if (study_of_shapes(protocol)) return renderer_orders(protocol);
-  return square_rows(protocol).period();
+  // Version 2 fixes the order of renderers, version 1 that of blocks.
+  return renderer_orders(protocol) * square_rows(protocol).period();
 }
 
 bool is_external(const Protocol& protocol) {

@@ -203,6 +203,13 @@ Protocol shapes_view(const Protocol& protocol, const TaskBlock* block) {
   return view;
 }
 
+/// Whether orientations are drawn with the order, for all such blocks of a participant together.
+bool has_order_of_shapes(const TaskBlock& block) {
+  if (block.order == BlockOrder::shapes) return true;
+  return block.task == TaskKind::identify && block.procedures.empty() && block.factors.empty() &&
+         (block.renderers.size() == 1 || (!block.max_run && !block.min_distance));
+}
+
 std::vector<Trial> shapes_trials(const Protocol& protocol, int participant, int index, int round) {
   const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
   const Protocol view = shapes_view(protocol, &block);
@@ -248,16 +255,17 @@ void draw_shape_orientations(const Protocol& protocol, int participant, int inde
 
 }  // namespace
 
-bool has_order_of_shapes(const TaskBlock& block) {
-  if (block.order == BlockOrder::shapes) return true;
-  return block.task == TaskKind::identify && block.procedures.empty() && block.factors.empty() &&
-         (block.renderers.size() == 1 || (!block.max_run && !block.min_distance));
-}
-
 std::vector<Trial> trials_of_block(const Protocol& protocol, int participant, int index,
                                    std::uint64_t round) {
   const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
-  if (!has_order_of_shapes(block)) return fixed_trials(protocol, participant, index, round);
+  if (!has_order_of_shapes(block)) {
+    std::vector<Trial> trials = fixed_trials(protocol, participant, index, round);
+    const auto before = static_cast<std::size_t>(round) * trials.size();
+    for (std::size_t i = 0; i < trials.size(); ++i)
+      trials[i].orientation = orientation_in_block(protocol, participant,
+                                                   static_cast<std::uint64_t>(index), before + i);
+    return trials;
+  }
   std::vector<Trial> trials = shapes_trials(protocol, participant, index, static_cast<int>(round));
   if (!block.practice) draw_shape_orientations(protocol, participant, index, trials);
   return trials;

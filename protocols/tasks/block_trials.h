@@ -13,17 +13,15 @@
 
 namespace palpate::protocols {
 
-/// Whether orientations are drawn with the order, for all such blocks of a participant together.
-bool has_order_of_shapes(const TaskBlock& block);
-
-/// The trials of a block in order.
+/// The trials of a block in order, with their orientations.
 /// \param index  of the block
 /// \param round  of practice with a criterion, from 0
 /// \throws ScheduleError
 std::vector<Trial> trials_of_block(const Protocol& protocol, int participant, int index,
                                    std::uint64_t round = 0);
 
-/// The orientation of trial `shown` (from 0) of a block without the order of shapes.
+/// The orientation of trial `shown` (from 0, through all rounds) of a block without the order of
+/// shapes.
 Quat orientation_in_block(const Protocol& protocol, int participant, std::uint64_t block,
                           std::size_t shown);
 

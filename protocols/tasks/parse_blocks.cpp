@@ -659,6 +659,27 @@ void check_practice(ObjectReader& reader, const TaskBlock& block) {
 
 std::string block_pointer(std::size_t i) { return "/blocks/" + std::to_string(i); }
 
+void check_names(ObjectReader& item, const std::string& name, std::set<std::string>& names) {
+  if (!name.empty() && !names.insert(name).second)
+    item.faults().add(item.pointer("name"), "expected a unique name, found '" + name + "' again");
+}
+
+void check_sessions(const Protocol& protocol, FaultList& faults) {
+  int session = 1;
+  for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
+    const int next = protocol.blocks[i].session;
+    if (i == 0 && next != 1) {
+      faults.add(block_pointer(i) + "/session", "expected session 1 of the first block");
+    } else if (next != session && next != session + 1) {
+      faults.add(block_pointer(i) + "/session", "expected session " + std::to_string(session) +
+                                                    " or " + std::to_string(session + 1) +
+                                                    ", as the previous block is in session " +
+                                                    std::to_string(session));
+    }
+    session = next;
+  }
+}
+
 }  // namespace
 
 TaskBlock read_block(ObjectReader& reader, const Protocol& protocol) {
@@ -707,31 +728,6 @@ TaskBlock read_block(ObjectReader& reader, const Protocol& protocol) {
   reader.refuse_unknown_keys();
   return block;
 }
-
-namespace {
-
-void check_names(ObjectReader& item, const std::string& name, std::set<std::string>& names) {
-  if (!name.empty() && !names.insert(name).second)
-    item.faults().add(item.pointer("name"), "expected a unique name, found '" + name + "' again");
-}
-
-void check_sessions(const Protocol& protocol, FaultList& faults) {
-  int session = 1;
-  for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
-    const int next = protocol.blocks[i].session;
-    if (i == 0 && next != 1) {
-      faults.add(block_pointer(i) + "/session", "expected session 1 of the first block");
-    } else if (next != session && next != session + 1) {
-      faults.add(block_pointer(i) + "/session", "expected session " + std::to_string(session) +
-                                                    " or " + std::to_string(session + 1) +
-                                                    ", as the previous block is in session " +
-                                                    std::to_string(session));
-    }
-    session = next;
-  }
-}
-
-}  // namespace
 
 std::vector<ScaleStep> read_scale_steps(ObjectReader& reader, const char* key, Presence presence) {
   std::vector<ScaleStep> steps;

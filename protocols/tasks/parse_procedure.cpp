@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "protocols/parse_grid.h"
 #include "protocols/parse_scene.h"
 #include "protocols/tasks/levels.h"
 #include "protocols/tasks/parse_blocks.h"

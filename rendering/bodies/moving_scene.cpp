@@ -360,7 +360,7 @@ void MovingBodies::find_probe_contacts(BodiesState& state, std::size_t body,
   ProbeContact contact;
   contact.spring.body = static_cast<std::uint32_t>(body);
   if (felt.contacts == 0) {
-    if (state.held[body].holds) go_on(state, stroke, body);
+    if (state.held[body].holds) continue_contact(state, stroke, body);
     return;
   }
   if (!shape.features().unions) {
@@ -395,7 +395,8 @@ void MovingBodies::find_probe_contacts(BodiesState& state, std::size_t body,
 /// Continues the contact of the last step if the probe is above its plane at the end of this one:
 /// within the step it still presses. A probe that is still below the plane and not about to leave
 /// it has passed the border of the touched face: the plane ends there, and so does the contact.
-void MovingBodies::go_on(BodiesState& state, const Stroke& stroke, std::size_t body) const {
+void MovingBodies::continue_contact(BodiesState& state, const Stroke& stroke,
+                                    std::size_t body) const {
   const BodiesState::Held& held = state.held[body];
   ProbeContact contact = held.contact;
   const Pose frame = pose_of(state, body);
@@ -417,7 +418,7 @@ void MovingBodies::go_on(BodiesState& state, const Stroke& stroke, std::size_t b
   state.held[body].holds = false;
 }
 
-/// Remembers a body's spring at the end of the step, for go_on.
+/// Remembers a body's spring at the end of the step, for continue_contact.
 void MovingBodies::hold(BodiesState& state, const Stroke& stroke,
                         const ProbeContact& contact) const {
   const std::uint32_t body = contact.spring.body;

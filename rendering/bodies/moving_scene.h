@@ -118,7 +118,7 @@ class MovingBodies final : public SceneMotion {
   void feel(const Renderer& renderer, BodiesState& state, std::size_t body,
             const Stroke& stroke) const;
   void find_probe_contacts(BodiesState& state, std::size_t body, const Stroke& stroke) const;
-  void go_on(BodiesState& state, const Stroke& stroke, std::size_t body) const;
+  void continue_contact(BodiesState& state, const Stroke& stroke, std::size_t body) const;
   void hold(BodiesState& state, const Stroke& stroke, const ProbeContact& contact) const;
   void place_contact(BodiesState& state, const Stroke& stroke, const Pose& frame, const Vec3& shift,
                      ProbeContact contact) const;

@@ -1,16 +1,10 @@
-#include "protocols/schedule.h"
-
-#include <algorithm>
-#include <cstddef>
 #include <cstdint>
-#include <iomanip>
 #include <iostream>
-#include <nlohmann/json.hpp>
 
 #include "protocols/groups.h"
 #include "protocols/parse.h"
 #include "runner/commands/shared/command.h"
-#include "runner/output/outputs.h"
+#include "runner/study/schedule_text.h"
 #include "runner/study/study_order.h"
 #include "runner/study/task_words.h"
 
@@ -18,59 +12,6 @@ namespace palpate::runner::commands {
 namespace {
 
 namespace po = boost::program_options;
-
-const std::string& shape_of(const protocols::Protocol& protocol, const protocols::Trial& trial) {
-  return protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name;
-}
-
-void print_csv(const protocols::Protocol& protocol, const std::vector<protocols::Trial>& trials,
-               int participant) {
-  output::CsvText table(study::schedule_columns(), "\r\n");
-  for (const protocols::Trial& trial : trials)
-    study::put_scheduled(table, protocol, trial, participant);
-  std::cout << table.text();
-}
-
-void print_json(const protocols::Protocol& protocol, const std::vector<protocols::Trial>& trials,
-                int participant) {
-  nlohmann::ordered_json rows = nlohmann::ordered_json::array();
-  for (const protocols::Trial& trial : trials) {
-    const Quat& q = trial.orientation;
-    rows.push_back({{"session", trial.session},
-                    {"block", trial.block},
-                    {"trial", trial.trial},
-                    {"renderer", protocols::to_string(trial.renderer)},
-                    {"shape", shape_of(protocol, trial)},
-                    {"orientation_wxyz", {q.w, q.x, q.y, q.z}},
-                    {"practice", trial.practice}});
-  }
-  const nlohmann::ordered_json document = {{"protocol", protocol.name},
-                                           {"protocol_sha256", protocol.sha256},
-                                           {"program_version", PALPATE_VERSION},
-                                           {"participant_number", participant},
-                                           {"trials", rows}};
-  std::cout << document.dump(1) << "\n";
-}
-
-void print_table(const protocols::Protocol& protocol, const std::vector<protocols::Trial>& trials) {
-  std::size_t width = 5;
-  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
-    width = std::max(width, stimulus.name.size());
-  }
-  const auto shape_width = static_cast<int>(width);
-  std::cout << "session  block  trial  renderer  " << std::left << std::setw(shape_width) << "shape"
-            << "  orientation (w x y z)\n";
-  std::cout << std::fixed << std::setprecision(3);
-  for (const protocols::Trial& trial : trials) {
-    const Quat& q = trial.orientation;
-    std::cout << std::right << std::setw(7) << trial.session << std::setw(7) << trial.block
-              << std::setw(7) << trial.trial << "  " << std::left << std::setw(8)
-              << protocols::to_string(trial.renderer) << "  " << std::setw(shape_width)
-              << shape_of(protocol, trial) << std::right;
-    for (const double part : {q.w, q.x, q.y, q.z}) std::cout << std::setw(8) << part;
-    std::cout << (trial.practice ? "  practice\n" : "\n");
-  }
-}
 
 /// The number of participant `row` of a group. \throws UsageError
 int number_in(const std::string& name, const GroupAssignment& groups, int row) {
@@ -137,18 +78,7 @@ int schedule_command(const std::vector<std::string>& args) {
     std::cout << study::fixed_order(protocol, participant);
     return 0;
   }
-  if (protocol.version == 2) {
-    std::cout << study::task_schedule_text(protocol, participant, format);
-    return 0;
-  }
-  const std::vector<protocols::Trial> trials = protocols::schedule(protocol, participant);
-  if (format == "csv") {
-    print_csv(protocol, trials, participant);
-  } else if (format == "json") {
-    print_json(protocol, trials, participant);
-  } else {
-    print_table(protocol, trials);
-  }
+  std::cout << study::schedule_text(protocol, participant, format);
   return 0;
 }
 

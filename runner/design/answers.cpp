@@ -14,6 +14,7 @@
 #include "protocols/tasks/texts.h"
 #include "runner/scene_builder.h"
 #include "runner/station/protocol_check.h"
+#include "runner/study/schedule_text.h"
 #include "runner/study/task_words.h"
 #include "runner/touch/checked_meshes.h"
 #include "runner/usage_error.h"
@@ -98,21 +99,6 @@ void put_rows(Json& out, const Json& trials) {
   out["all"] = trials.size();
 }
 
-Json trials_of(const Protocol& protocol, int participant) {
-  if (protocol.version == 2)
-    return read_ordered_json(study::task_schedule_text(protocol, participant, "json"))["trials"];
-  Json out = Json::array();
-  for (const protocols::Trial& trial : protocols::schedule(protocol, participant)) {
-    out.push_back({{"session", trial.session},
-                   {"block", trial.block},
-                   {"trial", trial.trial},
-                   {"renderer", protocols::to_string(trial.renderer)},
-                   {"shape", protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name},
-                   {"practice", trial.practice}});
-  }
-  return out;
-}
-
 /// Builds what the library builds, in a builder that outlives it. Faults are the library's to tell.
 void build_shapes(const Protocol& protocol, SceneBuilder& builder) {
   for (const protocols::StimulusSpec& stimulus : protocols::with_all_levels(protocol).stimuli) {
@@ -178,7 +164,7 @@ Json schedule_answer(const std::string& text, const std::string& path, int parti
   const Protocol& protocol = protocols::protocol_of(all, participant);
   Json out{{"participant", participant}};
   if (all.groups.any()) out["group"] = all.groups.true_name(all.groups.group(participant));
-  put_rows(out, trials_of(protocol, participant));
+  put_rows(out, read_ordered_json(study::schedule_text(protocol, participant, "json"))["trials"]);
   return out;
 }
 

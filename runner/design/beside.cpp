@@ -59,8 +59,8 @@ Vec3 solid_size(const stimuli::ObjectSpec& object) {
   return high - low;
 }
 
-}  // namespace
-
+/// Multiplies coordinates of this largest extent so that a hand can hold the object: 1 for metres,
+/// 0.001 for millimetres, 0.0254 for inches. \param largest  in the file's unit
 double proposed_scale(double largest) {
   constexpr double kLeast = 0.005, kMost = 0.3;  // m, in a hand's reach
   for (const double scale : {1.0, 0.001, 0.0254, 0.01}) {
@@ -70,6 +70,8 @@ double proposed_scale(double largest) {
   if (!(largest > 0) || !std::isfinite(largest)) return 1;
   return std::pow(10, std::floor(std::log10(kHandy / largest)));
 }
+
+}  // namespace
 
 Json add_mesh(const ProtocolFile& file, const std::string& folder, const std::string& name,
               const std::string& bytes) {

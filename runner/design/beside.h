@@ -19,10 +19,6 @@ namespace palpate::runner::design {
 nlohmann::ordered_json add_mesh(const ProtocolFile& file, const std::string& folder,
                                 const std::string& name, const std::string& bytes);
 
-/// Multiplies coordinates of this largest extent so that a hand can hold the object: 1 for metres,
-/// 0.001 for millimetres, 0.0254 for inches. \param largest  in the file's unit
-double proposed_scale(double largest);
-
 /// Of the translations that are there.
 std::vector<std::string> languages_of(const ProtocolFile& file);
 

@@ -70,6 +70,22 @@ std::string report_of(data::Store& store) {
   return analysis::study_html(found, study.record);
 }
 
+/// What a palpate of this computer does with a person and a device now: "run", "serve", "explore";
+/// "": nothing.
+std::string session_on_this_computer() {
+  std::error_code error;
+  for (const fs::directory_entry& entry : fs::directory_iterator("/proc", error)) {
+    const std::string name = entry.path().filename().string();
+    if (name.find_first_not_of("0123456789") != std::string::npos) continue;
+    const std::vector<std::string> words = command_line_of(entry.path());
+    if (words.size() < 2 || fs::path(words[0]).filename() != "palpate") continue;
+    for (const char* const with_a_person : {"run", "serve", "explore"}) {
+      if (words[1] == with_a_person) return words[1];
+    }
+  }
+  return "";
+}
+
 }  // namespace
 
 TemporaryFolder::TemporaryFolder() {
@@ -95,20 +111,6 @@ TemporaryFolder::TemporaryFolder() {
 TemporaryFolder::~TemporaryFolder() {
   ::close(life_);
   ::waitpid(child_, nullptr, 0);
-}
-
-std::string session_on_this_computer() {
-  std::error_code error;
-  for (const fs::directory_entry& entry : fs::directory_iterator("/proc", error)) {
-    const std::string name = entry.path().filename().string();
-    if (name.find_first_not_of("0123456789") != std::string::npos) continue;
-    const std::vector<std::string> words = command_line_of(entry.path());
-    if (words.size() < 2 || fs::path(words[0]).filename() != "palpate") continue;
-    for (const char* const with_a_person : {"run", "serve", "explore"}) {
-      if (words[1] == with_a_person) return words[1];
-    }
-  }
-  return "";
 }
 
 Rehearsal::~Rehearsal() {

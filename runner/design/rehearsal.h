@@ -33,10 +33,6 @@ class TemporaryFolder {
   int child_ = -1;
 };
 
-/// What a palpate of this computer does with a person and a device now: "run", "serve", "explore";
-/// "": nothing.
-std::string session_on_this_computer();
-
 class Rehearsal {
  public:
   struct Request {

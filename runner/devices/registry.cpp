@@ -51,60 +51,6 @@ const PairRegistration& registration_of(const Calibration& calibration,
             name}});
 }
 
-}  // namespace
-
-servo::DeviceCapabilities pair_of(const servo::DeviceCapabilities& end, const char* name) {
-  servo::DeviceCapabilities can = end;
-  can.name = name;
-  can.sensed_freedom = can.actuated_freedom = 5;
-  can.max_torque = 0;  // forces at both ends produce it
-  return can;
-}
-
-PairDevice::PairDevice(std::unique_ptr<servo::Device> tip, std::unique_ptr<servo::Device> tail,
-                       const StylusFromEnds& stylus, const char* name,
-                       const std::string& calibration)
-    : tip_(std::move(tip)), tail_(std::move(tail)), stylus_(stylus) {
-  const servo::DeviceCapabilities &one = tip_->capabilities(), &other = tail_->capabilities();
-  capabilities_ = pair_of(one, name);
-  capabilities_.max_force = std::min(one.max_force, other.max_force);
-  capabilities_.max_stiffness = std::min(one.max_stiffness, other.max_stiffness);
-  capabilities_.max_rate = std::min(one.max_rate, other.max_rate);
-  capabilities_.workspace_radius = std::min(one.workspace_radius, other.workspace_radius);
-  capabilities_.resolution = std::max(one.resolution, other.resolution);
-  capabilities_.serial = one.serial + ", " + other.serial;
-  capabilities_.calibration = calibration;
-}
-
-servo::DeviceReading PairDevice::read() noexcept {
-  const servo::DeviceReading tip = tip_->read(), tail = tail_->read();
-  // Report the trouble of a lost end before that of a late one.
-  servo::DeviceTrouble trouble = tip.trouble;
-  if (!tip.lost && tail.trouble != servo::DeviceTrouble::none) trouble = tail.trouble;
-  lost_ = tip.lost || tail.lost;
-  if (!lost_ && !stylus_.update(tip.stylus.tip, tail.stylus.tip)) {
-    lost_ = true;
-    trouble = servo::DeviceTrouble::apart;
-  }
-  return {stylus_.stylus(), static_cast<std::uint8_t>((tip.buttons & 15U) | tail.buttons << 4U),
-          lost_, trouble};
-}
-
-void PairDevice::write(const Vec3& device1, const Vec3& device2) noexcept {
-  // Push with both or none: a force from one device alone would turn the stylus.
-  tip_->write(lost_ ? Vec3(0) : device1, Vec3(0));
-  tail_->write(lost_ ? Vec3(0) : stylus_.to_tail_frame(device2), Vec3(0));
-}
-
-void PairDevice::reopen() {
-  lost_ = true;
-  write(Vec3(0), Vec3(0));
-  tip_->reopen();
-  tail_->reopen();
-}
-
-namespace {
-
 using Json = nlohmann::json;
 constexpr std::chrono::seconds kListingPatience(3), kCalibrationPatience(60);
 
@@ -290,6 +236,56 @@ Json in_child(const std::function<Json()>& work, std::chrono::seconds patience,
 }
 
 }  // namespace
+
+servo::DeviceCapabilities pair_of(const servo::DeviceCapabilities& end, const char* name) {
+  servo::DeviceCapabilities can = end;
+  can.name = name;
+  can.sensed_freedom = can.actuated_freedom = 5;
+  can.max_torque = 0;  // forces at both ends produce it
+  return can;
+}
+
+PairDevice::PairDevice(std::unique_ptr<servo::Device> tip, std::unique_ptr<servo::Device> tail,
+                       const StylusFromEnds& stylus, const char* name,
+                       const std::string& calibration)
+    : tip_(std::move(tip)), tail_(std::move(tail)), stylus_(stylus) {
+  const servo::DeviceCapabilities &one = tip_->capabilities(), &other = tail_->capabilities();
+  capabilities_ = pair_of(one, name);
+  capabilities_.max_force = std::min(one.max_force, other.max_force);
+  capabilities_.max_stiffness = std::min(one.max_stiffness, other.max_stiffness);
+  capabilities_.max_rate = std::min(one.max_rate, other.max_rate);
+  capabilities_.workspace_radius = std::min(one.workspace_radius, other.workspace_radius);
+  capabilities_.resolution = std::max(one.resolution, other.resolution);
+  capabilities_.serial = one.serial + ", " + other.serial;
+  capabilities_.calibration = calibration;
+}
+
+servo::DeviceReading PairDevice::read() noexcept {
+  const servo::DeviceReading tip = tip_->read(), tail = tail_->read();
+  // Report the trouble of a lost end before that of a late one.
+  servo::DeviceTrouble trouble = tip.trouble;
+  if (!tip.lost && tail.trouble != servo::DeviceTrouble::none) trouble = tail.trouble;
+  lost_ = tip.lost || tail.lost;
+  if (!lost_ && !stylus_.update(tip.stylus.tip, tail.stylus.tip)) {
+    lost_ = true;
+    trouble = servo::DeviceTrouble::apart;
+  }
+  return {stylus_.stylus(), static_cast<std::uint8_t>((tip.buttons & 15U) | tail.buttons << 4U),
+          lost_, trouble};
+}
+
+void PairDevice::write(const Vec3& device1, const Vec3& device2) noexcept {
+  // Push with both or none: a force from one device alone would turn the stylus.
+  tip_->write(lost_ ? Vec3(0) : device1, Vec3(0));
+  tail_->write(lost_ ? Vec3(0) : stylus_.to_tail_frame(device2), Vec3(0));
+}
+
+void PairDevice::reopen() {
+  lost_ = true;
+  write(Vec3(0), Vec3(0));
+  tip_->reopen();
+  tail_->reopen();
+}
 
 std::vector<servo::ConnectedDevice> list_connected(const DeviceKind& kind,
                                                    const servo::DeviceConfig& config) {

@@ -11,6 +11,7 @@
 #include "data/base/text.h"
 #include "protocols/factors.h"
 #include "protocols/procedures/procedure.h"
+#include "protocols/procedures/recovery.h"
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
 #include "runner/usage_error.h"

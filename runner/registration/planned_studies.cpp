@@ -73,6 +73,7 @@ class PlannedTimes final : public PlannedStudies {
              bool with_effect) const override;
   std::string analyzed(const std::string& csv, const std::string& name) override;
   std::string analyzed(std::size_t study, bool with_effect) const override;
+  std::size_t usual_studies() const override { return 200; }
 
  private:
   struct Outcome {
@@ -274,6 +275,7 @@ class PlannedTasks final : public PlannedStudies {
              bool with_effect) const override;
   std::string analyzed(const std::string& csv, const std::string& name) override;
   std::string analyzed(std::size_t study, bool with_effect) const override;
+  std::size_t usual_studies() const override { return 20; }  // run trial by trial
 
  private:
   participants::JudgementOf judgement(std::size_t study, bool with_effect) const;
@@ -546,10 +548,6 @@ std::string PlannedTasks::analyzed(std::size_t study, bool with_effect) const {
 std::unique_ptr<PlannedStudies> planned_studies(const Registration& made) {
   if (protocols::study_of_shapes(made.protocol)) return std::make_unique<PlannedTimes>(made);
   return std::make_unique<PlannedTasks>(made);
-}
-
-std::size_t usual_studies(const protocols::Protocol& protocol) {
-  return protocols::study_of_shapes(protocol) ? 200 : 20;
 }
 
 double typical_time(const protocols::Protocol& protocol, double too_fast) {

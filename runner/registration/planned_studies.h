@@ -25,15 +25,13 @@ class PlannedStudies {
   virtual std::string analyzed(const std::string& csv, const std::string& name) = 0;
   /// The analysis of study 0, 1, ..., as JSON. Several threads may call it after analyzed().
   virtual std::string analyzed(std::size_t study, bool with_effect) const = 0;
+  /// Studies that are simulated with the effect, and as many with none, unless the lab says.
+  virtual std::size_t usual_studies() const = 0;
 };
 
 /// \param made  with protocol, plan, number of participants, seed and settings; must outlive it
 /// \throws UsageError: its tasks cannot be simulated
 std::unique_ptr<PlannedStudies> planned_studies(const Registration& made);
-
-/// Studies that are simulated with the effect, and as many with none, unless the lab says: the
-/// tasks of version 2 are run trial by trial.
-std::size_t usual_studies(const protocols::Protocol& protocol);
 
 /// s; the plan has only ratios of times, so this is the geometric middle between the limit of too
 /// fast answers and the time-out, to lose the fewest trials at either end. 0: nothing is

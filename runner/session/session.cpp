@@ -425,7 +425,7 @@ bool Session::ask_level() {
 }
 
 /// The state before the next trial; after the last one, pages and the end are shown.
-void Session::go_on() {
+void Session::proceed() {
   state_ = before_trial();
   if (state_ != State::end) return;
   show_pages(protocols::PageSpec::When::after);
@@ -570,7 +570,7 @@ void Session::step() {
       break;
     case State::trial:
       if (!ask_level())
-        go_on();
+        proceed();
       else if (run_trial())
         state_ = State::response;
       break;
@@ -580,7 +580,7 @@ void Session::step() {
       participant_.learn_from(record_);
       report_level();
       give_feedback();
-      go_on();
+      proceed();
       break;
     case State::end:
       break;

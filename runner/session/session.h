@@ -84,7 +84,7 @@ class Session {
   void ask_confidence(const protocols::ConfidenceSpec& asked);
   void begin_task_block();
   bool ask_level();
-  void go_on();
+  void proceed();
   void report_level();
   void read_instructions(const protocols::TaskBlock& block);
   void resume_task_block();

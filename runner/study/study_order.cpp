@@ -9,7 +9,7 @@
 #include "protocols/groups.h"
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
-#include "runner/study/task_words.h"
+#include "runner/study/schedule_text.h"
 
 namespace palpate::runner::study {
 namespace {

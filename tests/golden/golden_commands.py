@@ -277,7 +277,7 @@ def examining_lines():
                 " --figure accuracy.timed.svg --force", timed=True)
     yield steps("stability protocols/scenes/fig13-two-objects.json --device simulated --json buzz.json --report buzz.html --figure buzz.svg"
                 " --jobs 2 --force")
-    yield refused("stability protocols/scenes/fig13-two-objects.json --device simulated --calibration none.json")
+    yield [refused("stability protocols/scenes/fig13-two-objects.json --device simulated --calibration none.json")]
     yield steps("accuracy protocols/scenes/fig13-two-objects.json --quick --renderer ray --json scene.json --report scene.timed.html"
                 " --figure scene.timed.svg --force", timed=True)
     yield steps("accuracy protocols/scenes/fig13-two-objects.json --quick --trajectory protocols/scenes/fig13-two-objects.csv"

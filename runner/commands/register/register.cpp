@@ -311,9 +311,9 @@ void put_simulated(const RegisterOptions& options, const data::AtomicFolder& dra
   made.hypotheses = analysis::read_hypotheses(made.hypotheses_text, options.hypotheses,
                                               analysis::named_results(with, made.alpha));
   output::ProgressLine line("simulated studies");
-  made.rehearsals = registration::rehearse(
-      *studies, made, options.studies.value_or(registration::usual_studies(made.protocol)),
-      options.jobs, [&](double share) { line.show(share); });
+  made.rehearsals =
+      registration::rehearse(*studies, made, options.studies.value_or(studies->usual_studies()),
+                             options.jobs, [&](double share) { line.show(share); });
   line.clear();
 }
 

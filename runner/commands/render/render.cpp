@@ -25,6 +25,9 @@
 #include "stimuli/parts/convex_parts.h"
 
 namespace palpate::runner::commands {
+namespace {
+
+namespace po = boost::program_options;
 
 // `palpate render --explain`: the stages of a tick over a scene, and their costs.
 
@@ -46,13 +49,6 @@ struct Explanation {
   std::vector<evidence::FeatureTime> features = {};  ///< that the scene has
   std::vector<evidence::FeatureSaved> saved = {};    ///< that it does not need
 };
-
-Explanation explain_with_costs(const rendering::Scene& scene, const rendering::Renderer& renderer);
-
-std::string to_text(const Explanation& explanation);
-nlohmann::ordered_json to_json(const Explanation& explanation);
-
-namespace {
 
 /// ns for a call: the least of several runs, each long enough for the clock.
 double cost_of(const evidence::StageTiming& timing) {
@@ -134,8 +130,6 @@ StageCost bodies_stage(const rendering::Scene& scene, const rendering::Renderer&
        << " us a tick over the first half second without the probe; what rests sleeps";
   return {{"moving bodies", evidence::StageTime::tick, true, text.str()}, std::nullopt};
 }
-
-}  // namespace
 
 Explanation explain_with_costs(const rendering::Scene& scene, const rendering::Renderer& renderer) {
   Explanation explanation;
@@ -292,10 +286,6 @@ nlohmann::ordered_json to_json(const Explanation& e) {
           {"left_out_measured", evidence::kCostsMeasured},
           {"notes", e.notes}};
 }
-
-namespace {
-
-namespace po = boost::program_options;
 
 /// An option's value; \throws UsageError if it was not given.
 std::string given(const po::variables_map& values, const char* option, const char* because) {

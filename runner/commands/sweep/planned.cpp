@@ -4,6 +4,7 @@
 #include <exception>
 #include <iostream>
 #include <map>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <numeric>
 #include <stdexcept>
@@ -34,7 +35,7 @@ using nlohmann::json;
 json base_protocol(const protocols::Protocol& protocol, const SweepSettings& settings) {
   json out = read_json(protocol.source_text);
   if (settings.repetitions == 0) return out;
-  if (protocol.version == 2)
+  if (!out.contains("repetitions"))
     throw UsageError("--repetitions: the blocks of a protocol of version 2 have their own");
   out["repetitions"] = settings.repetitions;
   if (protocol.blocks_per_renderer > settings.repetitions) {
@@ -110,10 +111,20 @@ std::size_t index_of(const std::vector<std::string>& names, const std::string& n
   return static_cast<std::size_t>(found - names.begin());
 }
 
-/// Trials in the analysis' form, and the time in contact of each cell.
-class TrialCollection {
+/// The figures of a point, from its trials.
+class PointFigures {
  public:
-  explicit TrialCollection(const data::SweepPlan& plan)
+  virtual ~PointFigures() = default;
+  virtual void add(int participant, const data::TrialRecord& record,
+                   std::uint64_t contact_ticks) = 0;
+  /// In the order of figure_columns().
+  virtual std::vector<std::optional<double>> figures() const = 0;
+};
+
+/// Those of the study of shapes.
+class ShapeFigures final : public PointFigures {
+ public:
+  explicit ShapeFigures(const data::SweepPlan& plan)
       : cells_(plan.renderers.size() * plan.shapes.size()) {
     table_.renderers = plan.renderers;
     table_.shapes = table_.answers = plan.shapes;
@@ -121,7 +132,7 @@ class TrialCollection {
       table_.participants.push_back(session::simulated_code(i));
   }
 
-  void add(int participant, const data::TrialRecord& record, std::uint64_t contact_ticks) {
+  void add(int participant, const data::TrialRecord& record, std::uint64_t contact_ticks) override {
     if (record.practice) return;
     analysis::TrialRow row;
     row.participant = static_cast<std::uint32_t>(participant - 1);
@@ -138,8 +149,7 @@ class TrialCollection {
     cell.contact_ticks += contact_ticks;
   }
 
-  /// In the order of figure_columns().
-  std::vector<std::optional<double>> figures() const {
+  std::vector<std::optional<double>> figures() const override {
     const analysis::Description description = analysis::describe(table_, kTooFast);
     std::vector<std::optional<double>> out = gains(description);
     const auto each_cell = [&](const auto& figure) {
@@ -261,7 +271,6 @@ analysis::StudyTable trials_of_group(const analysis::StudyTable& all, const std:
   return out;
 }
 
-/// The figures of a protocol of version 2, in the order of figure_columns().
 std::vector<std::optional<double>> task_figures_of(const data::SweepPlan& plan,
                                                    const analysis::StudyTable& table) {
   analysis::FunctionSettings without_p;
@@ -290,6 +299,36 @@ std::vector<std::optional<double>> task_figures_of(const data::SweepPlan& plan,
     }
   }
   return out;
+}
+
+/// Those of blocks of tasks.
+class TaskFigures final : public PointFigures {
+ public:
+  TaskFigures(const data::SweepPlan& plan, GroupAssignment groups)
+      : plan_(plan), groups_(std::move(groups)) {}
+
+  void add(int participant, const data::TrialRecord& record,
+           std::uint64_t /*contact_ticks*/) override {
+    if (record.practice) return;
+    trials_.trials.push_back(
+        analysis::study_trial_of(session::simulated_code(participant), record));
+    trials_.trials.back().group = groups_.name(participant);
+  }
+  std::vector<std::optional<double>> figures() const override {
+    return task_figures_of(plan_, trials_);
+  }
+
+ private:
+  const data::SweepPlan& plan_;
+  GroupAssignment groups_;
+  analysis::StudyTable trials_;
+};
+
+/// \param plan  must outlive it
+std::unique_ptr<PointFigures> figures_for(const protocols::Protocol& protocol,
+                                          const data::SweepPlan& plan) {
+  if (protocols::study_of_shapes(protocol)) return std::make_unique<ShapeFigures>(plan);
+  return std::make_unique<TaskFigures>(plan, protocol.groups.unmasked());
 }
 
 std::vector<json> values_of_point(const Sweep& sweep, std::int64_t point) {
@@ -384,24 +423,17 @@ std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
   row.order_seed = study.order_seed;
   try {
     protocols::Protocol protocol = sweep.study.parse(study.protocol);
-    const GroupAssignment groups = protocol.groups.unmasked();
     const participants::SimulatedSettings settings =
         participants::read_simulated_settings(study.settings.dump());
     session::limit_for_simulation(protocol, settings);
-    const bool has_blocks = !protocols::study_of_shapes(protocol);
-    TrialCollection trials(sweep.plan);
-    analysis::StudyTable tasks;
+    const std::unique_ptr<PointFigures> figures = figures_for(protocol, sweep.plan);
     const bool done = session::simulate_in_memory(
         protocol, settings, session::first_numbers(sweep.plan.participants), study.seed, stop,
         [&](int participant, const data::TrialRecord& record, std::uint64_t contact_ticks) {
-          if (!has_blocks) return trials.add(participant, record, contact_ticks);
-          if (record.practice) return;
-          tasks.trials.push_back(
-              analysis::study_trial_of(session::simulated_code(participant), record));
-          tasks.trials.back().group = groups.name(participant);
+          figures->add(participant, record, contact_ticks);
         });
     if (!done) return std::nullopt;
-    row.figures = has_blocks ? task_figures_of(sweep.plan, tasks) : trials.figures();
+    row.figures = figures->figures();
   } catch (const std::exception& error) {
     row.reason = reason_of(error);
     row.figures.assign(data::figure_columns(sweep.plan).size(), std::nullopt);

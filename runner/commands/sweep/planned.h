@@ -10,6 +10,7 @@
 #include "protocols/protocol.h"
 #include "runner/commands/shared/command.h"
 #include "runner/output/outputs.h"
+#include "runner/sweep/design.h"
 #include "runner/sweep/swept_study.h"
 
 namespace palpate::runner::commands {

@@ -66,45 +66,7 @@ std::vector<std::string> how_to_read(const SceneStudy& study) {
   return all;
 }
 
-}  // namespace
-
-analysis::Table scene_table(const std::vector<SceneStudy>& studies) {
-  const bool several = studies.size() > 1;
-  analysis::Table table;
-  table.caption =
-      several ? "Scenes of every kind: every method that can show them"
-              : "Methods on " + studies.front().name + " (" + studies.front().renderer + ")";
-  if (several) table.header.emplace_back("scene");
-  for (const char* name :
-       {"method", "triangles", "median us", "p99 us", "worst us", "cold us", "cold p99",
-        "force N: rms", "99.9 %", "worst", "torque Nm", "tip mm", "lost", "phantom", "best"})
-    table.header.emplace_back(name);
-  table.n_names = several ? 2 : 1;
-  for (const SceneStudy& study : studies) {
-    for (const SceneRow& row : study.rows) {
-      std::vector<std::string> cells;
-      if (several) cells.push_back(study.name);
-      cells.insert(cells.end(), {row.method, thousands(static_cast<long long>(row.triangles)),
-                                 microseconds(row.median_ns), microseconds(row.p99_ns),
-                                 microseconds(row.worst_ns), microseconds(row.cold_median_ns),
-                                 microseconds(row.cold_p99_ns)});
-      if (row.errors) {
-        const SceneErrors& e = *row.errors;
-        cells.insert(cells.end(),
-                     {significant(e.force_rms), significant(e.force_p999), significant(e.force_max),
-                      or_dash(e.torque_max), or_dash(e.tip_max, 1e3), std::to_string(e.lost),
-                      std::to_string(e.phantom)});
-      } else {
-        cells.insert(cells.end(), 7, "-");
-      }
-      cells.emplace_back(row.best ? "*" : "");
-      table.rows.push_back(std::move(cells));
-    }
-  }
-  table.notes.emplace_back("*: no other method of the scene is both quicker and nearer.");
-  return table;
-}
-
+/// Force error over time, as letters on a grid of characters; the best are marked.
 std::string scene_plot(const SceneStudy& study) {
   constexpr int kWide = 56, kHigh = 12;
   const std::vector<const SceneRow*> rows = drawn_rows(study);
@@ -149,6 +111,77 @@ std::string scene_plot(const SceneStudy& study) {
       << std::string(11, ' ') << first << analysis::pad_left(last, kWide + 1 - first.size())
       << "\n " << legend << "\n  Capital letters: no other method is both quicker and nearer.\n";
   return out.str();
+}
+
+Json scene_rows_json(const SceneStudy& study) {
+  const auto figure = [](const std::optional<double>& value) {
+    return value ? Json(*value) : Json(nullptr);
+  };
+  Json rows = Json::array();
+  for (const SceneRow& row : study.rows) {
+    const auto error = [&](double SceneErrors::*member) {
+      return row.errors ? Json((*row.errors).*member) : Json(nullptr);
+    };
+    rows.push_back(
+        {{"method", row.method},
+         {"description", row.description},
+         {"triangles", row.triangles},
+         {"median_ns", row.median_ns},
+         {"p99_ns", row.p99_ns},
+         {"worst_ns", row.worst_ns},
+         {"cold_median_ns", row.cold_median_ns},
+         {"cold_p99_ns", row.cold_p99_ns},
+         {"ticks_timed", row.timed},
+         {"force_error_rms_n", error(&SceneErrors::force_rms)},
+         {"force_error_p999_n", error(&SceneErrors::force_p999)},
+         {"force_error_max_n", error(&SceneErrors::force_max)},
+         {"torque_error_max_nm", row.errors ? figure(row.errors->torque_max) : Json(nullptr)},
+         {"tip_error_max_m", row.errors ? figure(row.errors->tip_max) : Json(nullptr)},
+         {"ticks_compared", row.errors ? Json(row.errors->ticks) : Json(nullptr)},
+         {"lost", row.errors ? Json(row.errors->lost) : Json(nullptr)},
+         {"phantom", row.errors ? Json(row.errors->phantom) : Json(nullptr)},
+         {"best", row.best}});
+  }
+  return rows;
+}
+
+}  // namespace
+
+analysis::Table scene_table(const std::vector<SceneStudy>& studies) {
+  const bool several = studies.size() > 1;
+  analysis::Table table;
+  table.caption =
+      several ? "Scenes of every kind: every method that can show them"
+              : "Methods on " + studies.front().name + " (" + studies.front().renderer + ")";
+  if (several) table.header.emplace_back("scene");
+  for (const char* name :
+       {"method", "triangles", "median us", "p99 us", "worst us", "cold us", "cold p99",
+        "force N: rms", "99.9 %", "worst", "torque Nm", "tip mm", "lost", "phantom", "best"})
+    table.header.emplace_back(name);
+  table.n_names = several ? 2 : 1;
+  for (const SceneStudy& study : studies) {
+    for (const SceneRow& row : study.rows) {
+      std::vector<std::string> cells;
+      if (several) cells.push_back(study.name);
+      cells.insert(cells.end(), {row.method, thousands(static_cast<long long>(row.triangles)),
+                                 microseconds(row.median_ns), microseconds(row.p99_ns),
+                                 microseconds(row.worst_ns), microseconds(row.cold_median_ns),
+                                 microseconds(row.cold_p99_ns)});
+      if (row.errors) {
+        const SceneErrors& e = *row.errors;
+        cells.insert(cells.end(),
+                     {significant(e.force_rms), significant(e.force_p999), significant(e.force_max),
+                      or_dash(e.torque_max), or_dash(e.tip_max, 1e3), std::to_string(e.lost),
+                      std::to_string(e.phantom)});
+      } else {
+        cells.insert(cells.end(), 7, "-");
+      }
+      cells.emplace_back(row.best ? "*" : "");
+      table.rows.push_back(std::move(cells));
+    }
+  }
+  table.notes.emplace_back("*: no other method of the scene is both quicker and nearer.");
+  return table;
 }
 
 analysis::Figure scene_figure(const std::vector<SceneStudy>& studies) {
@@ -204,38 +237,6 @@ analysis::Figure scene_figure(const std::vector<SceneStudy>& studies) {
     figure.panels.push_back(std::move(panel));
   }
   return figure;
-}
-
-Json scene_rows_json(const SceneStudy& study) {
-  const auto figure = [](const std::optional<double>& value) {
-    return value ? Json(*value) : Json(nullptr);
-  };
-  Json rows = Json::array();
-  for (const SceneRow& row : study.rows) {
-    const auto error = [&](double SceneErrors::*member) {
-      return row.errors ? Json((*row.errors).*member) : Json(nullptr);
-    };
-    rows.push_back(
-        {{"method", row.method},
-         {"description", row.description},
-         {"triangles", row.triangles},
-         {"median_ns", row.median_ns},
-         {"p99_ns", row.p99_ns},
-         {"worst_ns", row.worst_ns},
-         {"cold_median_ns", row.cold_median_ns},
-         {"cold_p99_ns", row.cold_p99_ns},
-         {"ticks_timed", row.timed},
-         {"force_error_rms_n", error(&SceneErrors::force_rms)},
-         {"force_error_p999_n", error(&SceneErrors::force_p999)},
-         {"force_error_max_n", error(&SceneErrors::force_max)},
-         {"torque_error_max_nm", row.errors ? figure(row.errors->torque_max) : Json(nullptr)},
-         {"tip_error_max_m", row.errors ? figure(row.errors->tip_max) : Json(nullptr)},
-         {"ticks_compared", row.errors ? Json(row.errors->ticks) : Json(nullptr)},
-         {"lost", row.errors ? Json(row.errors->lost) : Json(nullptr)},
-         {"phantom", row.errors ? Json(row.errors->phantom) : Json(nullptr)},
-         {"best", row.best}});
-  }
-  return rows;
 }
 
 Json scene_json(const SceneStudy& study) {

@@ -14,12 +14,9 @@ namespace palpate::runner::evidence {
 
 /// A row for each method of each scene.
 analysis::Table scene_table(const std::vector<SceneStudy>& studies);
-/// Force error over time, as letters on a grid of characters; the best are marked.
-std::string scene_plot(const SceneStudy& study);
 /// The same as a figure; a panel for each scene.
 analysis::Figure scene_figure(const std::vector<SceneStudy>& studies);
 
-nlohmann::ordered_json scene_rows_json(const SceneStudy& study);
 /// Of one scene.
 nlohmann::ordered_json scene_json(const SceneStudy& study);
 std::string scene_text(const SceneStudy& study);

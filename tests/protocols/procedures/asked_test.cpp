@@ -6,6 +6,7 @@
 #include <set>
 
 #include "protocols/procedures/procedure.h"
+#include "protocols/procedures/recovery.h"
 
 namespace palpate::protocols {
 namespace {

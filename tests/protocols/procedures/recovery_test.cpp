@@ -1,11 +1,11 @@
+#include "protocols/procedures/recovery.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <string>
-
-#include "protocols/procedures/procedure.h"
 
 namespace palpate::protocols {
 namespace {

@@ -5,6 +5,7 @@
 #include <string>
 
 #include "protocols/procedures/procedure.h"
+#include "protocols/procedures/recovery.h"
 
 namespace palpate::protocols {
 namespace {

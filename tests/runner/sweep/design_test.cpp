@@ -1,10 +1,11 @@
+#include "runner/sweep/design.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <set>
 
 #include "data/base/sobol.h"
-#include "runner/sweep/swept_study.h"
 
 namespace palpate::runner::sweep {
 namespace {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "analysis/statistics/sweep_analysis.h"
-#include "runner/sweep/swept_study.h"
+#include "runner/sweep/design.h"
 #include "tests/analysis/sweep_table_fixture.h"
 
 namespace palpate::runner::sweep {

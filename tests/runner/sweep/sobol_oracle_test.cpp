@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "analysis/statistics/sensitivity.h"
-#include "runner/sweep/swept_study.h"
+#include "runner/sweep/design.h"
 
 namespace palpate::runner::sweep {
 namespace {
