@@ -74,6 +74,8 @@ OrderedJson answer_model_json(const AnswerModel& model) {
   out["n_answers"] = model.n_answers;
   out["n_participants"] = model.n_participants;
   out["left_out"] = model.left_out;
+  out["without_group"] = model.without_group;
+  out["centre"] = model.centre;
   out["log_likelihood"] = model.log_likelihood;
   out["participants"] = {{"intercept_sd", model.intercept_sd},
                          {"slope_sd", model.slope_sd},
@@ -131,19 +133,25 @@ std::vector<std::string> answer_notes(const AnswerModel& model) {
       printable(answer_formula(model), 400) +
       ", Laplace's approximation. Lapses and guesses are not modelled: compare the hierarchical "
       "model, which has them. Intervals by the delta method; tests by Wald."};
-  if (model.bootstrapped > 0)
-    out.push_back("Bootstrap: 95 % of " + std::to_string(model.bootstrapped) +
-                  " simulated studies of the model" +
-                  (model.failed > 0
-                       ? ", without " + std::to_string(model.failed) + " that had no value"
-                       : "") +
-                  ".");
+  if (model.bootstrapped > 0) {
+    const bool made = model.cells.front().pse.bootstrap_ci95.has_value();
+    const std::string studies = std::to_string(model.bootstrapped) + " simulated studies";
+    const std::string failed = std::to_string(model.failed);
+    out.push_back(!made ? "No bootstrap: " + failed + " of " + studies +
+                              " had no value, so intervals of the others would be too short."
+                  : model.failed > 0 ? "Bootstrap: 95 % of " + studies + ", without " + failed +
+                                           " that had no value."
+                                     : "Bootstrap: 95 % of " + studies + " of the model.");
+  }
   out.push_back(
       "Participants differ with a standard deviation of " + short_number(model.intercept_sd) +
-      " (intercept) and " + short_number(model.slope_sd) + " (slope)" +
+      " (intercept, at the mean level) and " + short_number(model.slope_sd) + " (slope)" +
       (model.singular ? "; the fit is singular: a direction of it does not vary" : "") + ".");
   if (!model.left_out.empty())
     out.push_back("Left out, with reversed answers: " + printable(joined(model.left_out), 400) +
+                  ".");
+  if (!model.without_group.empty())
+    out.push_back("Left out, without a group: " + printable(joined(model.without_group), 400) +
                   ".");
   return out;
 }

@@ -234,7 +234,7 @@ std::vector<std::string> weighted_notes(const GroupedMeasure& of, const DesignMo
       "participants less groups."};
   if (model.n_without_error > 0)
     out.push_back(counted(model.n_without_error, "figure", "figures") +
-                  " with an open interval left out.");
+                  " undetermined or with an open interval, left out.");
   return out;
 }
 

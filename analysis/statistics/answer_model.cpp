@@ -5,7 +5,10 @@
 #include <boost/math/distributions/chi_squared.hpp>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
+#include <map>
 #include <numbers>
+#include <set>
+#include <tuple>
 #include <utility>
 
 #include "analysis/statistics/crossed_stimuli.h"
@@ -24,6 +27,8 @@ using Eigen::Index;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+/// Simulated studies without a value, above which there is no interval: it would be too short.
+constexpr double kMostFailed = 0.025;
 constexpr double kNormal75 = 0.67448975019608171, kNormal975 = 1.9599639845400545;
 
 /// The cells of the analysis that one model is of.
@@ -67,8 +72,9 @@ struct BlockAnswers {
   std::vector<StudyFactor> within;  ///< renderer, then factors
   bool crossed = false;
   std::size_t groups = 1;
-  std::vector<LevelAnswers> answers;
-  std::vector<std::string> participants, left_out;
+  std::vector<LevelAnswers> answers;  ///< places from the centre, in an order of names alone
+  double centre = 0;
+  std::vector<std::string> participants, left_out, without_group;
 
   std::size_t conditions() const {
     std::size_t out = 1;
@@ -89,6 +95,51 @@ std::vector<std::string> names_in_block(const BlockCells& block, Name name) {
 
 std::size_t place_of_name(const std::vector<std::string>& names, const std::string& name) {
   return static_cast<std::size_t>(std::ranges::find(names, name) - names.begin());
+}
+
+/// Puts the answers into the block, centred. The order of the rows of a table changes nothing.
+void put_answers(const BlockCells& block, const std::vector<std::string>& renderers,
+                 const std::vector<std::string>& stimuli, const std::vector<std::size_t>& order,
+                 const StudyTable& table, BlockAnswers& out) {
+  using Key = std::tuple<std::string, std::string, std::string, double>;
+  std::map<Key, LevelAnswers> sorted;
+  std::set<std::string> without_group;
+  const std::size_t conditions = out.conditions();
+  for (const TaskCell* const cell : block) {
+    const std::size_t condition = place_of_name(renderers, cell->renderer) * stimuli.size() +
+                                  order[place_of_name(stimuli, cell->shape)];
+    const bool is_log = cell->scale != protocols::LevelScale::linear;
+    for (const ParticipantFunction& one : cell->functions) {
+      const auto group = known_group(table.group_labels, one.participant);
+      if (!group) without_group.insert(one.participant);
+      if (!group || std::ranges::find(out.left_out, one.participant) != out.left_out.end())
+        continue;
+      for (const LevelCount& count : one.counts) {
+        if (count.trials == 0) continue;
+        const double place = is_log ? std::log10(count.level) : count.level;
+        sorted.emplace(
+            Key{one.participant, cell->shape, cell->renderer, place},
+            LevelAnswers{0, *group * conditions + condition, place,
+                         static_cast<double>(count.trials), static_cast<double>(count.successes)});
+      }
+    }
+  }
+  out.without_group.assign(without_group.begin(), without_group.end());
+  double trials = 0;
+  for (auto& [key, one] : sorted) {
+    if (!std::isfinite(one.place))
+      out.undefined = "a level of 0 has no place on a logarithmic scale";
+    if (out.participants.empty() || out.participants.back() != std::get<0>(key))
+      out.participants.push_back(std::get<0>(key));
+    one.participant = out.participants.size() - 1;
+    out.centre += one.trials * one.place;
+    trials += one.trials;
+    out.answers.push_back(one);
+  }
+  out.centre /= std::max(1.0, trials);
+  for (LevelAnswers& one : out.answers) one.place -= out.centre;
+  if (out.undefined.empty() && out.groups > 1 && out.participants.size() <= out.groups)
+    out.undefined = "one participant in each group, so no variance within groups";
 }
 
 BlockAnswers answers_of_block(const BlockCells& block, const StudyTable& table) {
@@ -115,28 +166,7 @@ BlockAnswers answers_of_block(const BlockCells& block, const StudyTable& table) 
         out.left_out.push_back(one.participant);
     }
   }
-  const std::size_t conditions = out.conditions();
-  for (const TaskCell* const cell : block) {
-    const std::size_t condition = place_of_name(renderers, cell->renderer) * stimuli.size() +
-                                  order[place_of_name(stimuli, cell->shape)];
-    for (const ParticipantFunction& one : cell->functions) {
-      const auto group = known_group(table.group_labels, one.participant);
-      if (!group || std::ranges::find(out.left_out, one.participant) != out.left_out.end())
-        continue;
-      const std::size_t number = place_of_name(out.participants, one.participant);
-      if (number == out.participants.size()) out.participants.push_back(one.participant);
-      for (const LevelCount& count : one.counts) {
-        if (count.trials == 0) continue;
-        const bool is_log = cell->scale != protocols::LevelScale::linear;
-        out.answers.push_back({number, *group * conditions + condition,
-                               is_log ? std::log10(count.level) : count.level,
-                               static_cast<double>(count.trials),
-                               static_cast<double>(count.successes)});
-      }
-    }
-  }
-  if (std::ranges::any_of(out.answers, [](const auto& one) { return !std::isfinite(one.place); }))
-    out.undefined = "a level of 0 has no place on a logarithmic scale";
+  put_answers(block, renderers, stimuli, order, table, out);
   return out;
 }
 
@@ -188,9 +218,11 @@ Bootstrapped bootstrapped_figures(const BlockAnswers& block, const ProbitMixedMo
             found[i] = one.coefficients;
           },
           {});
-  const auto none = std::erase_if(found, [](const VectorXd& one) { return one.size() == 0; });
   Bootstrapped out;
-  out.failed = none;
+  out.failed = std::erase_if(found, [](const VectorXd& one) { return one.size() == 0; });
+  // A study without a value has a step or no slope: beyond an end of the interval, or of either.
+  if (static_cast<double>(out.failed) > kMostFailed * static_cast<double>(settings.bootstrap))
+    found.clear();
   out.pse.resize(static_cast<Index>(cells), static_cast<Index>(found.size()));
   out.log_width.resizeLike(out.pse);
   for (std::size_t i = 0; i < found.size(); ++i) {
@@ -200,9 +232,9 @@ Bootstrapped bootstrapped_figures(const BlockAnswers& block, const ProbitMixedMo
   return out;
 }
 
-/// 95 % of the values; none: fewer than 100.
+/// 95 % of the values; none: no studies.
 std::optional<Interval> middle_of(const VectorXd& values) {
-  if (values.size() < 100) return std::nullopt;
+  if (values.size() == 0) return std::nullopt;
   std::vector<double> sorted(values.begin(), values.end());
   std::ranges::sort(sorted);
   return Interval{sorted_quantile(sorted, 0.025), sorted_quantile(sorted, 0.975)};
@@ -234,14 +266,15 @@ AnswerFigure changed_figure(AnswerFigure figure, Change change, double slope) {
   return figure;
 }
 
-void put_figures(const CellValues& pse, const CellValues& log_width, bool log_levels,
+void put_figures(const CellValues& pse, const CellValues& log_width, const AnswerModel& model,
                  std::size_t index, AnswerCell& cell) {
   const VectorXd one = VectorXd::Unit(pse.values.size(), static_cast<Index>(index));
-  const double place = pse.values[static_cast<Index>(index)];
+  const double place = model.centre + pse.values[static_cast<Index>(index)];
   const double width = std::exp(log_width.values[static_cast<Index>(index)]);
-  cell.pse = pse.combined(one);
+  cell.pse = changed_figure(
+      pse.combined(one), [&](double x) { return model.centre + x; }, 1);
   cell.jnd = log_width.combined(one);
-  if (log_levels) {
+  if (model.log_levels) {
     const auto level = [](double x) { return std::pow(10, x); };
     cell.pse = changed_figure(cell.pse, level, std::numbers::ln10 * level(place));
     cell.jnd = changed_figure(
@@ -348,6 +381,8 @@ AnswerModel model_of_block(const BlockCells& cells, const StudyTable& table,
   if (!out.undefined.empty()) return out;
   const BlockAnswers block = answers_of_block(cells, table);
   out.left_out = block.left_out;
+  out.without_group = block.without_group;
+  out.centre = block.centre;
   out.pse = modelled_measure(out.task == "detect" ? "threshold" : "pse", cells, block, table,
                              out.log_levels);
   out.jnd = modelled_measure(out.log_levels ? "weber_fraction" : "jnd", cells, block, table, true);
@@ -376,7 +411,7 @@ AnswerModel model_of_block(const BlockCells& cells, const StudyTable& table,
   const CellValues log_width{figure_values(AnswerScale::log_width, model.coefficients),
                              figure_covariance(AnswerScale::log_width, model), simulated.log_width};
   for (std::size_t c = 0; c < out.cells.size(); ++c)
-    put_figures(pse, log_width, out.log_levels, c, out.cells[c]);
+    put_figures(pse, log_width, out, c, out.cells[c]);
   put_measure(pse, table.tests, out.log_levels ? std::numbers::ln10 : 1, out.pse);
   put_measure(log_width, table.tests, 1, out.jnd);
   return out;

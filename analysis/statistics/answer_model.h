@@ -25,7 +25,8 @@ struct AnswerCell {
   std::size_t group = 0;
   std::vector<std::size_t> levels;  ///< of each factor of `within`
   std::size_t n_trials = 0, n_participants = 0;
-  double intercept = 0, intercept_se = 0, slope = 0, slope_se = 0;  ///< on the scale of the levels
+  double intercept = 0, intercept_se = 0;  ///< at the model's centre
+  double slope = 0, slope_se = 0;          ///< on the scale of the levels
   std::string undefined;  ///< reason if PSE and JND are missing; empty: they are not
   AnswerFigure pse;       ///< level of 50 %; of detection the threshold
   /// Half the distance of the levels of 25 and 75 %. On a logarithmic scale the ratio of half that
@@ -58,7 +59,9 @@ struct AnswerModel {
   std::string task, block_name, shape;
   bool log_levels = false;  ///< levels are log10 of them
   std::size_t n_answers = 0, n_participants = 0;
-  std::vector<std::string> left_out;      ///< participants whose answers are reversed
+  std::vector<std::string> left_out;       ///< participants whose answers are reversed
+  std::vector<std::string> without_group;  ///< participants whom the groups leave out
+  double centre = 0;  ///< mean of the answers' levels, on their scale: intercepts are there
   double intercept_sd = 0, slope_sd = 0;  ///< between participants
   std::optional<double> correlation;      ///< of intercepts and slopes; none: one does not vary
   bool singular = false;

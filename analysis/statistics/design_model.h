@@ -49,7 +49,8 @@ struct DesignModel {
   /// Of weighted figures: standard deviation of participants, and that of what is common to all
   /// figures besides the error of each.
   std::optional<double> participant_sd, common_sd;
-  std::size_t n_without_error = 0;  ///< weighted figures without a standard error: left out
+  /// Undetermined figures and those without a standard error: left out.
+  std::size_t n_without_error = 0;
 };
 
 /// \param contrasts  within groups as well

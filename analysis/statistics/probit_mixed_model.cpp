@@ -335,6 +335,11 @@ ProbitMixedModel fit_probit_mixed(const std::vector<LevelAnswers>& answers, std:
 
 ProbitMixedModel refit_probit_mixed(const std::vector<LevelAnswers>& answers, std::size_t cells,
                                     const ProbitMixedModel& near) {
+  if (std::string reason = why_no_probit_model(answers, cells); !reason.empty()) {
+    ProbitMixedModel out;
+    out.undefined = std::move(reason);
+    return out;
+  }
   const PlaceScale scale = place_scale(answers);
   const std::vector<PersonAnswers> participants = standardised(answers, scale);
   const auto n = static_cast<Index>(cells);

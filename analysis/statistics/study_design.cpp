@@ -177,6 +177,7 @@ GroupedMeasure task_by_design(const MeasureOfTask& task, const StudyTable& table
       const TaskGroup& cell = *task.cells[order[c]];
       const auto found = std::ranges::find(cell.renderers, renderers[r], &GroupMean::renderer);
       if (found == cell.renderers.end()) continue;
+      without_error += found->n_undetermined;
       for (const NamedFigure& one : found->participants) {
         const auto group = known_group(table.group_labels, one.participant);
         if (!group) continue;

@@ -317,6 +317,8 @@ int analyze_command(const std::vector<std::string>& args) {
     throw UsageError("--function, --scale, --glmm: there are no tasks with psychometric functions");
   const analysis::StudyAnalysis analysis =
       analysis::analyze_study(std::move(study.table), functions, settings, PALPATE_VERSION);
+  if (functions.answer_model && analysis.answer_models.empty())
+    throw UsageError("--glmm: there are no comparisons or detections with levels");
   put(outputs, analysis, study.record);
   outputs.write();
   std::cout << analysis::study_text(analysis);

@@ -103,6 +103,29 @@ class AnswerModel(unittest.TestCase):
         model, = self.models(rows, "--bootstrap", "0")
         self.assertEqual((model["left_out"], model["n_participants"]), (["P04"], 9))
 
+    def test_steep_answers_have_no_bootstrap(self):
+        """People whose simulated answers often are a step: a slope without an end."""
+        study = {"participant": [], "cell": [], "place": [], "trials": [], "successes": []}
+        for person in range(6):
+            for place, successes in ((-2, 0), (-1, int(person < 1)), (1, 5 - int(person == 2)), (2, 5)):
+                for key, value in (("participant", person), ("cell", 0), ("place", place), ("trials", 5), ("successes", successes)):
+                    study[key].append(value)
+        model, = self.models(rows_of(study), "--bootstrap", "100")
+        self.assertGreater(model["bootstrap"]["without_value"], 2)
+        self.assertIsNone(model["cells"][0]["pse"]["bootstrap_ci95"])
+        self.assertIn("No bootstrap", self.text)
+
+    def test_rows_and_origin_of_levels_change_nothing(self):
+        rows = rows_of(STUDIES[0])
+        first, = self.models(rows, "--bootstrap", "100")
+        far, = self.models(rows_of(STUDIES[0], 1e8)[::-1], "--bootstrap", "100")
+        for measure, shift in (("pse", 1e8 - STANDARD), ("jnd", 0)):
+            one, other = first["cells"][0][measure], far["cells"][0][measure]
+            self.assertAlmostEqual(other["estimate"] - shift, one["estimate"], delta=1e-5)
+            self.assertAlmostEqual(other["se"], one["se"], delta=1e-5)
+            for a, b in zip(other["bootstrap_ci95"], one["bootstrap_ci95"]):
+                self.assertAlmostEqual(a - shift, b, delta=1e-4)
+
     def test_options_that_do_not_fit(self):
         for options, words in ((("--bootstrap", "200"), "give --glmm"), (("--glmm", "--bootstrap", "20"), "100 to 100000"),
                                (("--glmm", "--cues"), "does not go with --cues")):
