@@ -107,7 +107,7 @@ class AnswerModel(unittest.TestCase):
         """People whose simulated answers often are a step: a slope without an end."""
         study = {"participant": [], "cell": [], "place": [], "trials": [], "successes": []}
         for person in range(6):
-            for place, successes in ((-2, 0), (-1, int(person < 1)), (1, 5 - int(person == 2)), (2, 5)):
+            for place, successes in ((-2, 0), (-1, int(person < 1)), (1, 5 - int(person in (0, 2))), (2, 5)):
                 for key, value in (("participant", person), ("cell", 0), ("place", place), ("trials", 5), ("successes", successes)):
                     study[key].append(value)
         model, = self.models(rows_of(study), "--bootstrap", "100")
