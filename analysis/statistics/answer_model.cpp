@@ -102,7 +102,7 @@ void put_answers(const BlockCells& block, const std::vector<std::string>& render
                  const std::vector<std::string>& stimuli, const std::vector<std::size_t>& order,
                  const StudyTable& table, BlockAnswers& out) {
   using Key = std::tuple<std::string, std::string, std::string, double>;
-  std::map<Key, LevelAnswers> sorted;
+  std::multimap<Key, LevelAnswers> sorted;  // logs of two levels may be one place
   std::set<std::string> without_group;
   const std::size_t conditions = out.conditions();
   for (const TaskCell* const cell : block) {
