@@ -87,9 +87,7 @@ struct BlockAnswers {
 template <class Name>
 std::vector<std::string> names_in_block(const BlockCells& block, Name name) {
   std::vector<std::string> out;
-  for (const TaskCell* const cell : block) {
-    if (std::ranges::find(out, name(*cell)) == out.end()) out.push_back(name(*cell));
-  }
+  for (const TaskCell* const cell : block) note_once(name(*cell), out);
   return out;
 }
 
@@ -162,8 +160,7 @@ BlockAnswers answers_of_block(const BlockCells& block, const StudyTable& table) 
   }
   for (const TaskCell* const cell : block) {
     for (const ParticipantFunction& one : cell->functions) {
-      if (one.reversed && std::ranges::find(out.left_out, one.participant) == out.left_out.end())
-        out.left_out.push_back(one.participant);
+      if (one.reversed) note_once(one.participant, out.left_out);
     }
   }
   put_answers(block, renderers, stimuli, order, table, out);
