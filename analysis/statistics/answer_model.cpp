@@ -14,6 +14,7 @@
 #include "analysis/statistics/crossed_stimuli.h"
 #include "analysis/statistics/design_effects.h"
 #include "analysis/statistics/jobs.h"
+#include "analysis/statistics/normal_tail.h"
 #include "analysis/statistics/probit_mixed_model.h"
 #include "analysis/statistics/quantiles.h"
 #include "analysis/statistics/task_analysis.h"
@@ -29,7 +30,6 @@ using Eigen::VectorXd;
 
 /// Simulated studies without a value, above which there is no interval: it would be too short.
 constexpr double kMostFailed = 0.025;
-constexpr double kNormal75 = 0.67448975019608171, kNormal975 = 1.9599639845400545;
 
 /// The cells of the analysis that one model is of.
 using BlockCells = std::vector<const TaskCell*>;

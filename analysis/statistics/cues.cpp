@@ -8,12 +8,12 @@
 #include <utility>
 
 #include "analysis/statistics/describe.h"
+#include "analysis/statistics/normal_tail.h"
 #include "data/base/random.h"
 
 namespace palpate::analysis {
 namespace {
 
-constexpr double kQuartile = 0.6744897501960817;  // of the standard normal
 constexpr double kMostCueLapse = 0.06;
 constexpr double kLeastProbability = 1e-12;
 constexpr std::size_t kFewestLevels = 3;
@@ -440,7 +440,7 @@ CueParticipant analyze_cues(const CueAnswers& answers, const CueSettings& settin
     return out;
   }
   const CueOptimum predicted = optimum_of(haptic.sd, visual.sd);
-  const double jnd = kQuartile * std::numbers::sqrt2;
+  const double jnd = kNormal75 * std::numbers::sqrt2;
   out.weight_visual = 0.5 + *slope;
   out.weight_predicted = predicted.weight;
   out.jnd_haptic = jnd * haptic.sd;

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 
+#include "analysis/statistics/normal_tail.h"
 #include "analysis/statistics/quantiles.h"
 #include "analysis/statistics/sensitivity.h"
 
@@ -15,13 +16,14 @@ using protocols::LevelScale;
 
 constexpr double kNoBound = std::numeric_limits<double>::infinity();
 
-const double kZ975 = 1.959963984540054;
 const double kSqrt2 = 1.4142135623730951;
 
 double cumulative(double z) { return cdf(boost::math::normal(), z); }
 double normal_density(double z) { return pdf(boost::math::normal(), z); }
 
-Interval around(double centre, double se) { return {centre - kZ975 * se, centre + kZ975 * se}; }
+Interval around(double centre, double se) {
+  return {centre - kNormal975 * se, centre + kNormal975 * se};
+}
 
 /// Variance of the normal quantile of a rate.
 double quantile_variance(double rate, double trials) {
@@ -227,7 +229,7 @@ Type2Roc type2_roc(const std::vector<ConfidenceTrial>& trials) {
   if (!(area > 0) || !(area < 1)) return result;
   const double logit = std::log(area / (1 - area)), spread = *result.se / (area * (1 - area));
   const auto share_at = [](double x) { return 1 / (1 + std::exp(-x)); };
-  result.area_ci95 = {share_at(logit - kZ975 * spread), share_at(logit + kZ975 * spread)};
+  result.area_ci95 = {share_at(logit - kNormal975 * spread), share_at(logit + kNormal975 * spread)};
   return result;
 }
 

@@ -5,6 +5,8 @@
 #include <limits>
 #include <set>
 
+#include "analysis/statistics/normal_tail.h"
+
 namespace palpate::analysis {
 namespace {
 
@@ -92,7 +94,7 @@ ArrayXd shares(PsychometricShape shape, const ArrayXd& z) {
   if (shape == PsychometricShape::logistic) return (1 + (-std::log(3.0) * z).exp()).inverse();
   if (shape == PsychometricShape::normal) {
     return z.unaryExpr(
-        [](double one) { return 0.5 * std::erfc(-0.67448975019608171 * one / std::sqrt(2.0)); });
+        [](double one) { return 0.5 * std::erfc(-kNormal75 * one / std::sqrt(2.0)); });
   }
   static const double low = std::log(-std::log(0.75)), high = std::log(std::log(4.0));
   return -((0.5 * (high - low) * z + 0.5 * (high + low)).exp().unaryExpr([](double hazard) {

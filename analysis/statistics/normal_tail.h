@@ -5,6 +5,8 @@
 namespace palpate::analysis {
 
 inline constexpr double kLogRoot2Pi = 0.91893853320467274178;
+/// Quantiles of the standard normal distribution: 0.75 and 0.975.
+inline constexpr double kNormal75 = 0.6744897501960817, kNormal975 = 1.959963984540054;
 
 /// log of the upper tail probability of the standard normal distribution, and its hazard (density /
 /// tail).

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "analysis/statistics/crossed_stimuli.h"
+#include "analysis/statistics/normal_tail.h"
 #include "analysis/statistics/task_analysis.h"
 #include "analysis/statistics/weighted_model.h"
 #include "data/base/cell_name.h"
@@ -114,8 +115,6 @@ DesignModel model_of_times(const Analysis& analysis, const StudyTable& table) {
 struct MeasureOfTask {
   std::vector<const TaskGroup*> cells;
 };
-
-constexpr double kNormal975 = 1.9599639845400545;
 
 /// From the interval of a figure; none: it is open.
 std::optional<double> error_of(const NamedFigure& figure, bool logarithms) {

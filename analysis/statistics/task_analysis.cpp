@@ -14,6 +14,7 @@
 #include <variant>
 
 #include "analysis/statistics/describe.h"
+#include "analysis/statistics/normal_tail.h"
 #include "data/base/cell_name.h"
 
 namespace palpate::analysis {
@@ -728,7 +729,7 @@ std::vector<Adjustment> adjustments(const std::vector<AdjustmentTrial>& trials) 
     }
     if (df > 0) {
       result.sd = std::sqrt(squares / df);
-      result.jnd = 0.6744897501960817 * *result.sd;
+      result.jnd = kNormal75 * *result.sd;
     }
     results.push_back(result);
   }
