@@ -298,18 +298,28 @@ ProbitMixedModel model_at(const Minimum& found, const PlaceScale& scale, Index c
   return out;
 }
 
+/// Answers at standardised places, by participant; or the reason why they have no model.
+struct PlacedAnswers {
+  PlacedAnswers(const PersonAnswers& answers, std::size_t cells)
+      : undefined(why_no_probit_model(answers, cells)) {
+    if (!undefined.empty()) return;
+    scale = place_scale(answers);
+    participants = standardised(answers, scale);
+  }
+
+  std::string undefined;
+  PlaceScale scale;
+  std::vector<PersonAnswers> participants;
+};
+
 }  // namespace
 
 ProbitMixedModel fit_probit_mixed(const std::vector<LevelAnswers>& answers, std::size_t cells) {
-  if (std::string reason = why_no_probit_model(answers, cells); !reason.empty()) {
-    ProbitMixedModel out;
-    out.undefined = std::move(reason);
-    return out;
-  }
-  const PlaceScale scale = place_scale(answers);
-  const std::vector<PersonAnswers> participants = standardised(answers, scale);
-  const Objective loss = probit_loss(participants);
-  const VectorXd pooled = pooled_start(participants, cells);
+  const PlacedAnswers placed(answers, cells);
+  if (!placed.undefined.empty()) return {placed.undefined};
+  const PlaceScale& scale = placed.scale;
+  const Objective loss = probit_loss(placed.participants);
+  const VectorXd pooled = pooled_start(placed.participants, cells);
   std::vector<VectorXd> starts;
   for (const auto& [level, slope] : {std::pair{0.3, 0.3}, std::pair{1.0, 0.7}}) {
     VectorXd& start = starts.emplace_back(pooled);
@@ -335,13 +345,9 @@ ProbitMixedModel fit_probit_mixed(const std::vector<LevelAnswers>& answers, std:
 
 ProbitMixedModel refit_probit_mixed(const std::vector<LevelAnswers>& answers, std::size_t cells,
                                     const ProbitMixedModel& near) {
-  if (std::string reason = why_no_probit_model(answers, cells); !reason.empty()) {
-    ProbitMixedModel out;
-    out.undefined = std::move(reason);
-    return out;
-  }
-  const PlaceScale scale = place_scale(answers);
-  const std::vector<PersonAnswers> participants = standardised(answers, scale);
+  const PlacedAnswers placed(answers, cells);
+  if (!placed.undefined.empty()) return {placed.undefined};
+  const PlaceScale& scale = placed.scale;
   const auto n = static_cast<Index>(cells);
   const MatrixXd turn = unstandardised(scale, n).inverse();
   VectorXd start(2 * n + 3);
@@ -352,8 +358,8 @@ ProbitMixedModel refit_probit_mixed(const std::vector<LevelAnswers>& answers, st
   const double level = std::max(0.1, std::sqrt(spread(0, 0)));
   const double shared = spread(0, 1) / level;
   start.tail(3) << level, shared, std::sqrt(std::max(0.01, spread(1, 1) - shared * shared));
-  return model_at(best_of(probit_loss(participants), {start}, probit_bounds(start.size())), scale,
-                  n);
+  return model_at(best_of(probit_loss(placed.participants), {start}, probit_bounds(start.size())),
+                  scale, n);
 }
 
 std::vector<LevelAnswers> simulate_answers(const std::vector<LevelAnswers>& answers,

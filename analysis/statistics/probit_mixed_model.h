@@ -24,9 +24,9 @@ struct LevelAnswers {
 struct ProbitMixedModel {
   std::string undefined;  ///< reason if there is no fit; empty: fitted
   /// Of each cell its intercept (at place 0) and its slope, the latter in 1 / place.
-  Eigen::VectorXd coefficients;
+  Eigen::VectorXd coefficients{};
   /// Of these, from the Hessian of the log likelihood by all parameters.
-  Eigen::MatrixXd covariance;
+  Eigen::MatrixXd covariance{};
   Eigen::Matrix2d spread = Eigen::Matrix2d::Zero();  ///< covariance of intercepts and slopes
   bool singular = false;                             ///< some direction of `spread` does not vary
   double log_likelihood = 0;                         ///< without binomial coefficients
