@@ -40,9 +40,6 @@ GroupJson marginal_json(const GroupedMeasure& of, const GroupMarginal& one) {
   return out;
 }
 
-/// Whether the model is of participants' figures, each with its error; else of single trials.
-bool is_weighted(const GroupedMeasure& of) { return of.measure != "time"; }
-
 /// "log(response_time) ~ group * renderer * shape + (1 + renderer | participant)"
 std::string formula_of(const GroupedMeasure& of, const DesignModel& model) {
   std::string fixed = of.groups.empty() ? "" : "group", random = "1";
@@ -51,7 +48,7 @@ std::string formula_of(const GroupedMeasure& of, const DesignModel& model) {
   }
   for (const std::string& slope : model.slopes) random += " + " + slope;
   if (fixed.empty()) fixed = "1";
-  const std::string value = is_weighted(of) ? of.measure : "response_time";
+  const std::string value = model.weighted ? of.measure : "response_time";
   return (of.logarithms ? "log(" + value + ")" : value) + " ~ " + fixed + " + (" + random +
          " | participant)";
 }
@@ -71,7 +68,7 @@ GroupJson model_json(const GroupedMeasure& of, const DesignModel& model) {
                 {"n_observations", model.n_observations},
                 {"n_participants", model.n_participants},
                 {"slopes_taken_out", model.taken_out}};
-  if (is_weighted(of)) {
+  if (model.weighted) {
     out.erase("slopes_taken_out");
     out["participant_sd"] = design_number_json(model.participant_sd);
     out["common_sd"] = design_number_json(model.common_sd);
@@ -241,7 +238,7 @@ std::vector<std::string> weighted_notes(const GroupedMeasure& of, const DesignMo
 /// What the mixed model is, and what was taken out of it.
 std::vector<std::string> model_notes(const GroupedMeasure& of) {
   const DesignModel& model = *of.model;
-  if (is_weighted(of)) return weighted_notes(of, model);
+  if (model.weighted) return weighted_notes(of, model);
   std::vector<std::string> out{printable(formula_of(of, model)) +
                                ", REML, type III, degrees of freedom by Satterthwaite."};
   std::string names;
@@ -257,10 +254,11 @@ std::vector<std::string> model_notes(const GroupedMeasure& of) {
 /// The mixed model's effects; without rows if there is none.
 Table group_model_table(const GroupedMeasure& of, const std::string& label) {
   Table out;
-  out.caption = labelled_caption(
-      measure_title(of) + (is_weighted(of) ? ": mixed model weighted by standard errors"
-                                           : ": linear mixed model of single trials"),
-      label);
+  out.caption =
+      labelled_caption(measure_title(of) + (of.model && of.model->weighted
+                                                ? ": mixed model weighted by standard errors"
+                                                : ": linear mixed model of single trials"),
+                       label);
   out.header = {"Effect", "df", "F", "p", "p (Holm)"};
   if (!of.model) return out;
   for (const GroupEffect& one : of.model->effects) {
@@ -378,8 +376,8 @@ std::string design_text(const std::vector<GroupedMeasure>& measures) {
     for (const GroupEffect& effect : one.result.anova.effects)
       text += "  " + effect.name + ": " + f_test_text(effect) + "\n";
     if (one.model && !one.model->effects.empty()) {
-      text += is_weighted(one) ? "  mixed model weighted by standard errors\n"
-                               : "  mixed model of single trials\n";
+      text += one.model->weighted ? "  mixed model weighted by standard errors\n"
+                                  : "  mixed model of single trials\n";
       for (const std::string& note : model_notes(one)) text += "    " + note + "\n";
     }
     for (std::size_t i = 0; one.model && i < one.model->effects.size(); ++i)

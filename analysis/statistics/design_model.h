@@ -34,6 +34,7 @@ struct ModelMean {
 /// weighted_model.h.
 struct DesignModel {
   std::string undefined;  ///< reason if there is no fit; empty: fitted
+  bool weighted = false;  ///< of figures with standard errors; else of single times
   std::string singular;   ///< what does not vary although no slope is left; empty: all do
   std::size_t n_observations = 0, n_participants = 0;
   /// Effects that participants differ in besides their level: "renderer", "lag", "renderer:lag".

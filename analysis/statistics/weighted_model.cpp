@@ -140,6 +140,7 @@ class WeightedTester {
 DesignModel weighted_model(const std::vector<WeightedFigure>& figures, std::size_t groups,
                            const std::vector<WithinFactor>& conditions, WithinContrasts contrasts) {
   DesignModel out;
+  out.weighted = true;
   WeightedData data;
   for (const WithinFactor& factor : conditions)
     data.conditions *= static_cast<Index>(factor.levels);
