@@ -95,16 +95,13 @@ constexpr double kSteepestTexture = 2;  // of its slope
 
 constexpr std::size_t kLargeMesh = 50'000;  // faces; worth another thread
 
-/// What object i may collide with, for messages: the first object that moves, or if it moves
-/// itself the first other one. Empty: nothing.
-std::string met_by(const std::vector<stimuli::ObjectSpec>& objects, std::size_t i) {
-  if (objects[i].soft) return {};
+/// Whether object i may collide with others.
+bool may_collide(const std::vector<stimuli::ObjectSpec>& objects, std::size_t i) {
+  if (objects[i].soft) return false;
   for (std::size_t k = 0; k < objects.size(); ++k) {
-    if (k == i || objects[k].soft) continue;
-    if (objects[k].body) return "/objects/" + std::to_string(k) + ", which moves";
-    if (objects[i].body) return "/objects/" + std::to_string(k) + " as it moves";
+    if (k != i && !objects[k].soft && (objects[k].body || objects[i].body)) return true;
   }
-  return {};
+  return false;
 }
 
 /// m; the size of the box of the corners that faces use.
@@ -657,13 +654,11 @@ std::vector<std::vector<int>> SceneBuilder::solids_of(
   return connected(static_cast<int>(objects.size()), meet);
 }
 
-/// Places convex parts, of surfaces and layers without concave edges and for collisions, and other
-/// layers.
+/// Places convex parts, of surfaces and layers without concave edges, and other layers.
 void SceneBuilder::place_parts(const std::vector<stimuli::ObjectSpec>& objects,
                                const std::vector<int>& solid, Placing& placing, Placed& out) {
   for (const int object : solid) {
     const auto index = static_cast<std::size_t>(object);
-    std::string reason;
     try {
       if (object == solid.front()) {
         for (const int one : solid) {
@@ -676,23 +671,8 @@ void SceneBuilder::place_parts(const std::vector<stimuli::ObjectSpec>& objects,
       }
       layer_notes_.erase(object);
       place_layers(object, placing);
-      const std::string meets = met_by(objects, index);
-      if (!placing.by_surface || meets.empty()) continue;
-      reason = "it may meet " + meets +
-               ", and collisions need convex parts; it cannot be cut into them: ";
-      for (const PlacedShape& shape : placing.all) {
-        if (shape.object != object) continue;
-        for (const Prepared& part : prepare(*shape.spec, 0, placing.side_contact)) {
-          out.solids.push_back({part.mesh, shape.pose, shape.spec->material, object, part.trees});
-        }
-      }
     } catch (const stimuli::MeshError& error) {
-      // What asks for the cutting that failed.
-      std::vector<std::string> faults = error.faults();
-      for (std::string& fault : faults) {
-        if (placing.by_surface && !fault.starts_with('/')) fault.insert(0, reason);
-      }
-      throw stimuli::MeshError(at_object(objects, index, std::move(faults)));
+      throw stimuli::MeshError(at_object(objects, index, error.faults()));
     }
   }
   // The parts of a layer stand side by side.
@@ -745,20 +725,28 @@ SceneBuilder::Placed SceneBuilder::placed(const std::vector<stimuli::ObjectSpec>
     }
     placed.of_shell.resize(shells.size(), object);
   }
-  if (shells.empty()) {
-    add_layers();
-    return out;
-  }
   std::string key;
   if (alone && first.shape == stimuli::ShapeKind::mesh) {
     key = surface_key(first);
     if (const auto known = surfaces_.find(key); known != surfaces_.end())
       placed.surface = known->second;
   }
-  if (placed.surface == nullptr)
+  if (placed.surface == nullptr && !shells.empty())
     placed.surface = std::make_shared<const rendering::Surface>(shells);
-  if (!key.empty()) surfaces_.emplace(key, placed.surface);
-  out.surfaces.push_back(std::move(placed));
+  if (!key.empty() && placed.surface != nullptr) surfaces_.emplace(key, placed.surface);
+  for (const int object : solid) {
+    if (!may_collide(objects, static_cast<std::size_t>(object))) continue;
+    const stimuli::ObjectSpec& spec = objects[static_cast<std::size_t>(object)];
+    std::vector<rendering::SurfaceShell> whole;
+    add_shells(spec, Pose{}, false, whole);
+    const bool is_felt = alone && whole.size() == shells.size();
+    out.solids.push_back(
+        {is_felt ? placed.surface : std::make_shared<const rendering::Surface>(whole),
+         spec.pose,
+         object,
+         {}});
+  }
+  if (!shells.empty()) out.surfaces.push_back(std::move(placed));
   add_layers();
   return out;
 }
@@ -766,8 +754,8 @@ SceneBuilder::Placed SceneBuilder::placed(const std::vector<stimuli::ObjectSpec>
 rendering::Scene SceneBuilder::build(const std::vector<stimuli::ObjectSpec>& objects,
                                      bool side_contact, const rendering::Tool& tool,
                                      const Vec3& gravity, double soft_radius, double grip) {
-  std::vector<rendering::SceneObject> parts, shown, solids;
-  std::vector<rendering::SceneSurface> surfaces;
+  std::vector<rendering::SceneObject> parts, shown;
+  std::vector<rendering::SceneSurface> surfaces, solids;
   std::vector<std::shared_ptr<const rendering::SoftObject>> soft;
   std::vector<std::string> faults;
   for (const std::vector<int>& solid : solids_of(objects)) {

@@ -57,10 +57,10 @@ class SceneBuilder {
   /// Null: it is smooth. In the object's frame. \throws MeshError: its steepest slope exceeds 2, or
   /// it is deeper than the object is thick
   std::shared_ptr<const stimuli::Texture> texture_of(const stimuli::ObjectSpec& spec);
-  /// \throws MeshError with the place as a JSON pointer: a shape that may collide cannot be cut
-  /// into convex parts, a layer is empty, or a moving object exceeds a limit. \param gravity m/s^2,
-  /// on what moves or gives \param soft_radius  m, of the tool where it touches what gives \param
-  /// grip  m, from the virtual tip: where fields at the grip act
+  /// \throws MeshError with the place as a JSON pointer: a layer is empty, or a moving object
+  /// exceeds a limit. \param gravity m/s^2, on what moves or gives \param soft_radius  m, of the
+  /// tool where it touches what gives \param grip  m, from the virtual tip: where fields at the
+  /// grip act
   rendering::Scene build(const std::vector<stimuli::ObjectSpec>& objects, bool side_contact,
                          const rendering::Tool& tool = {}, const Vec3& gravity = Vec3(0),
                          double soft_radius = protocols::kSoftRadius, double grip = kSceneGrip);
@@ -97,7 +97,7 @@ class SceneBuilder {
   struct Placed {
     std::vector<rendering::SceneObject> parts;
     std::vector<rendering::SceneSurface> surfaces;
-    std::vector<rendering::SceneObject> solids;  ///< of its surfaces, for collisions
+    std::vector<rendering::SceneSurface> solids;  ///< whole ones, for collisions
   };
   /// \param solid  indices of one object, or of all those that touch each other
   Placed placed(const std::vector<stimuli::ObjectSpec>& objects, const std::vector<int>& solid,

@@ -95,7 +95,7 @@ void join_touching(const BodyWorld& world, BodyWorldState& state) {
   }
 }
 
-constexpr double kUnbounded = 1e300;
+constexpr double kUnbounded = HUGE_VAL;
 
 /// m/s; the least speed of separation at a contact: it may close its gap, and overlapping parts
 /// separate slowly.
@@ -127,7 +127,10 @@ void BodyWorld::pair_up() {
   first_part.assign(1, 0);
   for (const MovingBody& body : bodies)
     first_part.push_back(first_part.back() + static_cast<std::uint32_t>(body.parts.size()));
-  const auto add = [this](std::uint32_t a, std::uint32_t b, bool obstacle, std::size_t parts_of_b) {
+  const auto add = [this](std::uint32_t a, std::uint32_t b, bool obstacle, const auto& other) {
+    const std::size_t parts_of_b = other.parts.size();
+    const bool by_surface = bodies[a].parts.empty() || parts_of_b == 0;
+    if (by_surface && (bodies[a].surface == nullptr || other.surface == nullptr)) return;
     BodyPair pair;
     pair.a = a;
     pair.b = b;
@@ -137,15 +140,17 @@ void BodyWorld::pair_up() {
     const stimuli::Body& of_b = obstacle ? of_a : bodies[b].of;
     pair.restitution = std::sqrt(of_a.restitution * of_b.restitution);
     pair.friction = std::sqrt(of_a.friction * of_b.friction);
-    for (std::uint32_t i = 0; i < bodies[a].parts.size(); ++i) {
+    pair.by_surface = by_surface;
+    if (pair.by_surface) part_pairs.emplace_back();
+    for (std::uint32_t i = 0; i < bodies[a].parts.size() && !by_surface; ++i) {
       for (std::uint32_t k = 0; k < parts_of_b; ++k) part_pairs.push_back({i, k});
     }
     pair.count = static_cast<std::uint32_t>(part_pairs.size()) - pair.first;
     pairs.push_back(pair);
   };
   for (std::uint32_t a = 0; a < bodies.size(); ++a) {
-    for (std::uint32_t b = a + 1; b < bodies.size(); ++b) add(a, b, false, bodies[b].parts.size());
-    for (std::uint32_t k = 0; k < obstacles.size(); ++k) add(a, k, true, obstacles[k].parts.size());
+    for (std::uint32_t b = a + 1; b < bodies.size(); ++b) add(a, b, false, bodies[b]);
+    for (std::uint32_t k = 0; k < obstacles.size(); ++k) add(a, k, true, obstacles[k]);
   }
 }
 
@@ -157,6 +162,7 @@ void BodyWorldState::make_room() {
   problem.make_room();
   for (std::vector<Vec3>* polygon : {&clip.polygon, &clip.next}) polygon->reserve(most_corners);
   clip.points.reserve(most_corners);
+  if (has_surfaces) places.make_room();
 }
 
 BodyWorldState initial_state(const BodyWorld& world) {
@@ -186,6 +192,8 @@ BodyWorldState initial_state(const BodyWorld& world) {
   for (const Obstacle& obstacle : world.obstacles) look(obstacle.parts);
   state.most_pairs = world.pairs.size();
   state.most_parts = world.part_pairs.size();
+  state.has_surfaces = std::any_of(world.pairs.begin(), world.pairs.end(),
+                                   [](const auto& p) { return p.by_surface; });
   state.most_corners = 2 * most_sides + 2;  // each side of a facet adds at most one corner
   state.make_room();
   return state;
@@ -198,6 +206,10 @@ ConvexPlace place_of(const CollidingPart& part, const Pose& frame) {
   place.position = frame.orientation * part.pose.position + frame.position;
   place.inside = part.inside;
   return place;
+}
+
+SurfacePlace place_of(const CollisionSurface& surface, const Pose& frame) {
+  return {&surface, glm::mat3_cast(frame.orientation), frame.position};
 }
 
 double kinetic_energy(const BodyWorld& world, const BodyWorldState& state) {
@@ -589,6 +601,15 @@ Gap BodyContacts::gap_after(const BodyWorldState::NearParts& near, double time, 
   };
   const BodyMotion a = moved(pair.a), b = pair.obstacle ? BodyMotion{} : moved(pair.b);
   closing = a.velocity - b.velocity;
+  if (pair.by_surface) {
+    constexpr double kFarthest = 1e-2;  // m
+    Gap gap;
+    gap.distance = gap_between(
+        place_of(*world_.bodies[pair.a].surface, {a.centre, a.orientation}),
+        place_of(surface_b(pair), pair.obstacle ? Pose{} : Pose{b.centre, b.orientation}),
+        std::min(enough, kFarthest));
+    return gap;
+  }
   return gap_between(place_of(world_.bodies[pair.a].parts[parts.part_a], {a.centre, a.orientation}),
                      place_of(part_b(pair, parts.part_b), {b.centre, b.orientation}), enough,
                      memory);
@@ -620,9 +641,12 @@ double BodyContacts::meeting_time(const BodyWorldState::NearParts& near, double 
       gap = gap_after(near, time, enough, memory, closing);
     }
     if (gap.distance <= kMet) return time;
-    const double fall =
-        pair.obstacle ? std::max(0.0, glm::dot(world_.gravity, gap.normal)) * left : 0;
-    const double speed = glm::dot(gap.normal, closing) + turning + fall;
+    // Surfaces may meet in any direction.
+    const double fall = pair.by_surface ? falling * left
+                        : pair.obstacle ? std::max(0.0, glm::dot(world_.gravity, gap.normal)) * left
+                                        : 0;
+    const double speed =
+        (pair.by_surface ? glm::length(closing) : glm::dot(gap.normal, closing)) + turning + fall;
     if (!(speed * left > gap.distance - kSought)) return most;
     time += (gap.distance - kSought) / speed;
   }
@@ -830,6 +854,8 @@ void BodyContacts::find_in_pair(std::uint32_t index, double within, double extra
   const double turning =
       glm::length(state_.spin[pair.a]) * body_a.radius +
       (pair.obstacle ? 0 : glm::length(state_.spin[pair.b]) * world_.bodies[pair.b].radius);
+  const double spins =
+      glm::length(state_.spin[pair.a] - (pair.obstacle ? Vec3(0) : state_.spin[pair.b]));
   const double reach = 2 * kTouching + extra +
                        within * (glm::length(velocity - state_.motion[pair.a].velocity) + turning);
   PairPlaces& measured = state_.measured[index];
@@ -846,7 +872,12 @@ void BodyContacts::find_in_pair(std::uint32_t index, double within, double extra
     memory.least -= moved;
     const bool looked_for =
         places || state_.near_parts.empty() || state_.near_parts.back().pair != index;
-    if (looked_for && !(memory.least > reach)) measure_parts(index, pair.first + k, reach, places);
+    if (looked_for && !(memory.least > reach)) {
+      if (pair.by_surface)
+        measure_surfaces(index, reach, within * spins, places);
+      else
+        measure_parts(index, pair.first + k, reach, places);
+    }
     measured.least = std::min(measured.least, memory.least);
   }
 }
@@ -872,15 +903,45 @@ void BodyContacts::measure_parts(std::uint32_t index, std::uint32_t parts_index,
   state_.near_parts.push_back({index, parts_index, gap.distance, gap.distance <= kTouching});
   if (!places) return;
   find_manifold(at_a, at_b, gap, reach, memory, state_.clip, state_.manifold);
-  for (const ManifoldPoint& point : state_.manifold.points()) {
-    if (state_.contacts.size() == BodyWorldState::kMostContacts) {
-      state_.dropped = true;
-      return;
-    }
-    state_.contacts.push_back({pair.a, pair.obstacle ? BodyContact::kStands : pair.b, index,
-                               point.place, state_.manifold.normal, point.gap,
-                               static_cast<std::uint32_t>(state_.near_parts.size() - 1)});
+  for (const ManifoldPoint& point : state_.manifold.points())
+    add_contact(index, point.place, state_.manifold.normal, point.gap);
+}
+
+/// \param normal  from a to b
+void BodyContacts::add_contact(std::uint32_t index, const Vec3& place, const Vec3& normal,
+                               double gap) {
+  if (state_.contacts.size() == BodyWorldState::kMostContacts) {
+    state_.dropped = true;
+    return;
   }
+  const BodyPair& pair = world_.pairs[index];
+  state_.contacts.push_back({pair.a, pair.obstacle ? BodyContact::kStands : pair.b, index, place,
+                             normal, gap,
+                             static_cast<std::uint32_t>(state_.near_parts.size() - 1)});
+}
+
+const CollisionSurface& BodyContacts::surface_b(const BodyPair& pair) const {
+  return pair.obstacle ? *world_.obstacles[pair.b].surface : *world_.bodies[pair.b].surface;
+}
+
+/// The same of two surfaces.
+/// \param turn  rad, by which they may turn against each other
+void BodyContacts::measure_surfaces(std::uint32_t index, double reach, double turn, bool places) {
+  const BodyPair& pair = world_.pairs[index];
+  const SurfacePlace a = place_of(*world_.bodies[pair.a].surface, pose_of(pair.a)),
+                     b = place_of(surface_b(pair), pose_of_other(pair));
+  NearPlaces& found = state_.places;
+  constexpr double kRocks = 0.01;  // rad; by so much contact forces may turn them besides
+  double gap = places ? find_places(a, b, reach, turn + kRocks, found) : gap_between(a, b, reach);
+  // Where they overlap they are moved apart, which may close them elsewhere.
+  if (places && gap < -kTouching) gap = find_places(a, b, reach - 4 * gap, turn + kRocks, found);
+  state_.gaps[pair.first].least = gap;
+  if (gap > reach) return;
+  state_.near_parts.push_back({index, pair.first, gap, gap <= kTouching});
+  if (!places) return;
+  state_.dropped |= found.dropped;
+  for (const NearPlace& place : found.chosen)
+    add_contact(index, place.place, place.normal, place.gap);
 }
 
 double BodyContacts::separation_speed(const BodyContact& contact) const {

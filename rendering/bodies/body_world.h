@@ -11,6 +11,7 @@
 #include "rendering/bodies/complementarity.h"
 #include "rendering/bodies/convex_gap.h"
 #include "rendering/bodies/rigid_motion.h"
+#include "rendering/bodies/surface_gap.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::rendering {
@@ -28,22 +29,25 @@ struct MovingBody {
   int object = 0;
   BodyInertia inertia;
   stimuli::Body of;
-  std::vector<CollidingPart> parts;
+  std::vector<CollidingPart> parts;  ///< empty: it is not convex, nor of convex parts
+  /// In its frame; null: it has parts and meets only such as have some.
+  std::shared_ptr<const CollisionSurface> surface;
   double radius = 0;  ///< m, about the centre of mass
   BodyMotion start;
   Pose placed;           ///< where the scene put the body's frame
   double stiffness = 0;  ///< N/m, of its surface; beyond limits refused
 };
 
-/// The parts of one object that stands still.
+/// One object that stands still.
 struct Obstacle {
   int object = 0;
-  std::vector<CollidingPart> parts;
+  std::vector<CollidingPart> parts;                 ///< as of MovingBody
+  std::shared_ptr<const CollisionSurface> surface;  ///< in the world's frame
   Vec3 centre;
   double radius = 0;
 };
 
-/// Two parts that may touch.
+/// Two parts that may touch; of a pair that meets by its surfaces, the only one, without meaning.
 struct PartPair {
   std::uint32_t part_a = 0, part_b = 0;
 };
@@ -53,6 +57,7 @@ struct BodyPair {
   std::uint32_t a = 0;
   std::uint32_t b = 0;  ///< index of the body, or of the obstacle
   bool obstacle = false;
+  bool by_surface = false;             ///< not by convex parts
   std::uint32_t first = 0, count = 0;  ///< of the part pairs
   double restitution = 0, friction = 0;
 };
@@ -142,6 +147,8 @@ struct BodyWorldState {
   std::vector<char> pushed;
   ClipRoom clip;
   Manifold manifold;
+  bool has_surfaces = false;
+  NearPlaces places;
   ComplementarityProblem problem;
   struct Row {
     std::uint32_t a = BodyContact::kStands, b = BodyContact::kStands;
@@ -156,8 +163,9 @@ struct BodyWorldState {
 
 BodyWorldState initial_state(const BodyWorld& world);
 
-/// The present place of a part.
+/// The present place of a part or surface.
 ConvexPlace place_of(const CollidingPart& part, const Pose& frame);
+SurfacePlace place_of(const CollisionSurface& surface, const Pose& frame);
 
 /// Energy (J) and momenta (SI units) of all bodies.
 double kinetic_energy(const BodyWorld& world, const BodyWorldState& state);
@@ -280,6 +288,9 @@ class BodyContacts {
   void place_parts(std::uint32_t body);
   void find_in_pair(std::uint32_t index, double within, double extra, bool places);
   void measure_parts(std::uint32_t index, std::uint32_t parts_index, double reach, bool places);
+  void measure_surfaces(std::uint32_t index, double reach, double turn, bool places);
+  void add_contact(std::uint32_t index, const Vec3& place, const Vec3& normal, double gap);
+  const CollisionSurface& surface_b(const BodyPair& pair) const;
   double moved_since(const BodyPair& pair, const PairPlaces& measured) const;
   void begin_search();
   void look_at_pair(std::uint32_t index, double within, double extra, bool places);

@@ -125,6 +125,7 @@ void ComplementarityProblem::find_rates(std::size_t row) {
 
 /// Lets one row enter. False: no pivots are left.
 bool ComplementarityProblem::drive(std::size_t row, int& pivots_left) {
+  constexpr double kFelt = 1e-9;  // m/s, and of b
   x_[row] = 0;
   w_[row] = slack(row);
   const double scale = std::abs(b_[row]) + std::abs(a(row, row));
@@ -145,12 +146,14 @@ bool ComplementarityProblem::drive(std::size_t row, int& pivots_left) {
     solve_free(row, change_.data());
     find_rates(row);
     const double own_rate = direction * rate_[row];
-    // A row that depends on the free ones does not respond: it may go to its bound.
+    // A row that depends on the free ones does not respond until one of them has gone to its bound.
+    // Where it is only rounding that violates it, it stays as it is, and so does friction.
     const bool answers = std::abs(own_rate) > 1e-12 * std::abs(a(row, row));
+    const bool violated = std::abs(w_[row]) > kFelt * (1 + std::abs(b_[row]));
     double step = answers ? -w_[row] / own_rate : HUGE_VAL;
     enum class Stop { zero, bound, bind, release } stop = answers ? Stop::zero : Stop::bound;
     std::size_t at = 0;
-    if (!answers) return done_.push_back(row), true;
+    if (!answers && !(violated && leader_[row] < 0)) return done_.push_back(row), true;
     const double room = direction > 0 ? upper_[row] - x_[row] : x_[row] - lower_[row];
     if (room < step) {
       step = room;
@@ -182,6 +185,7 @@ bool ComplementarityProblem::drive(std::size_t row, int& pivots_left) {
         at = k;
       }
     }
+    if (!(step < HUGE_VAL)) return done_.push_back(row), true;  // nothing can help it
     x_[row] += direction * step;
     w_[row] += own_rate * step;
     for (std::size_t k = 0; k < free_.size(); ++k) x_[free_[k]] += direction * step * change_[k];

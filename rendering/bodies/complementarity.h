@@ -28,7 +28,8 @@ class ComplementarityProblem {
   std::size_t size() const { return count_; }
   bool full() const { return count_ == kMostRows; }
   /// \param leader  index of an earlier row; the bounds are multiples of its x; -1: none
-  /// \param bound   without leader: upper bound (the lower is 0); else the coefficient
+  /// \param bound   without leader: upper bound (the lower is 0), HUGE_VAL: none; else the
+  /// coefficient
   void add_row(double b, double bound, int leader = -1);
   /// Fill in when all rows are added.
   double& a(std::size_t row, std::size_t column) { return matrix_[row * count_ + column]; }

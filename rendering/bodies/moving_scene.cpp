@@ -52,8 +52,45 @@ CollidingPart colliding(const SceneObject& part, const Pose& in_frame) {
 struct OwnParts {
   std::vector<SceneObject> felt;
   std::vector<SceneSurface> surfaces;
-  std::vector<SceneObject> solid;  ///< its colliding parts
+  std::vector<SceneObject> solid;       ///< its colliding parts
+  const SceneSurface* whole = nullptr;  ///< its colliding surface
 };
+
+/// In the frame in which its own has this pose.
+std::shared_ptr<const CollisionSurface> colliding(const SceneSurface& surface, const Pose& pose) {
+  return std::make_shared<const CollisionSurface>(*surface.surface, pose);
+}
+
+/// The same of convex parts.
+std::shared_ptr<const CollisionSurface> colliding(const std::vector<CollidingPart>& parts) {
+  std::vector<Vec3> vertices;
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  for (const CollidingPart& part : parts) {
+    const auto first = static_cast<std::uint32_t>(vertices.size());
+    const stimuli::PolygonSoup soup = part.mesh->polygons();
+    for (const Vec3& v : soup.vertices)
+      vertices.push_back(part.pose.orientation * v + part.pose.position);
+    for (const std::vector<std::uint32_t>& face : soup.faces) {
+      for (std::size_t k = 2; k < face.size(); ++k)
+        triangles.push_back({first + face[0], first + face[k - 1], first + face[k]});
+    }
+  }
+  return std::make_shared<const CollisionSurface>(std::move(vertices), triangles);
+}
+
+/// Gives surfaces to bodies and obstacles of convex parts, if any other has only its surface.
+void meet_by_surface(BodyWorld& world) {
+  const auto has_no_parts = [](const auto& one) {
+    return one.parts.empty() && one.surface != nullptr;
+  };
+  const bool moves = std::ranges::any_of(world.bodies, has_no_parts);
+  const auto complete = [](auto& one) {
+    if (!one.parts.empty()) one.surface = colliding(one.parts);
+  };
+  if (moves || std::ranges::any_of(world.obstacles, has_no_parts))
+    std::ranges::for_each(world.bodies, complete);
+  if (moves) std::ranges::for_each(world.obstacles, complete);
+}
 
 MovingBody make_body(const MovingObject& moving, const OwnParts& own) {
   MovingBody body;
@@ -69,7 +106,7 @@ MovingBody make_body(const MovingObject& moving, const OwnParts& own) {
   }
   for (const SceneObject& part : own.solid)
     solids.push_back({part.mesh.get(), stimuli::compose(to_object, part.pose)});
-  if (solids.empty() && own.surfaces.empty())
+  if (solids.empty() && own.surfaces.empty() && own.whole == nullptr)
     refuse(moving.object, "expected an object with a surface");
   const auto outer = std::ranges::find(own.surfaces, 0, &SceneSurface::layer);
   const VolumeMoments moments =
@@ -92,6 +129,8 @@ MovingBody make_body(const MovingObject& moving, const OwnParts& own) {
   body.start.spin_momentum =
       spin_momentum_of(body.inertia, body.start.orientation, moving.body.spin);
   const Pose to_body = inverse(body.placed);
+  if (own.whole != nullptr)
+    body.surface = colliding(*own.whole, stimuli::compose(to_body, own.whole->pose));
   for (const SceneObject& part : own.solid) {
     body.parts.push_back(colliding(part, stimuli::compose(to_body, part.pose)));
     const CollidingPart& placed = body.parts.back();
@@ -99,12 +138,14 @@ MovingBody make_body(const MovingObject& moving, const OwnParts& own) {
       body.radius = std::max(body.radius,
                              glm::length(placed.pose.orientation * vertex + placed.pose.position));
   }
-  for (const SceneSurface& surface : own.surfaces) {
+  const auto reach_over = [&](const SceneSurface& surface) {
     const Pose placed = stimuli::compose(to_body, surface.pose);
     for (const Vec3& vertex : surface.surface->vertices())
       body.radius =
           std::max(body.radius, glm::length(placed.orientation * vertex + placed.position));
-  }
+  };
+  std::ranges::for_each(own.surfaces, reach_over);
+  if (own.whole != nullptr) reach_over(*own.whole);
   return body;
 }
 
@@ -119,6 +160,15 @@ Obstacle make_obstacle(const std::vector<SceneObject>& parts) {
   for (const CollidingPart& part : obstacle.parts)
     obstacle.radius =
         std::max(obstacle.radius, glm::length(part.centre - obstacle.centre) + part.mesh->radius());
+  return obstacle;
+}
+
+Obstacle make_obstacle(const SceneSurface& surface) {
+  Obstacle obstacle;
+  obstacle.object = surface.object;
+  obstacle.surface = colliding(surface, surface.pose);
+  obstacle.centre = surface.pose.orientation * surface.surface->centre() + surface.pose.position;
+  obstacle.radius = surface.surface->radius();
   return obstacle;
 }
 
@@ -166,7 +216,13 @@ void check_overlaps(const BodyWorld& world) {
         pair.obstacle ? world.obstacles[pair.b].parts : world.bodies[pair.b].parts;
     const Pose frame = pair.obstacle ? Pose{} : world.bodies[pair.b].placed;
     double overlap = 0;
-    for (std::uint32_t k = pair.first; k < pair.first + pair.count; ++k) {
+    if (pair.by_surface) {
+      const CollisionSurface& surface =
+          pair.obstacle ? *world.obstacles[pair.b].surface : *world.bodies[pair.b].surface;
+      overlap = overlap_of(place_of(*a.surface, a.placed), place_of(surface, frame));
+    }
+    for (std::uint32_t k = pair.by_surface ? pair.first + 1 : pair.first;
+         k < pair.first + pair.count; ++k) {
       GapMemory memory;
       const PartPair& both = world.part_pairs[k];
       const ConvexPlace at_a = place_of(a.parts[both.part_a], a.placed);
@@ -948,7 +1004,7 @@ std::optional<MovingSummary> moving_summary(const Scene& scene) {
 
 Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObject>& moving,
                    const Vec3& gravity, bool side_contact, const Tool& tool, bool sleeps,
-                   std::vector<SceneSurface> surfaces, std::vector<SceneObject> solids) {
+                   std::vector<SceneSurface> surfaces, std::vector<SceneSurface> solids) {
   if (moving.empty())
     return Scene(std::move(parts), side_contact, tool, nullptr, std::move(surfaces));
   if (moving.size() > kMostBodies)
@@ -972,7 +1028,6 @@ Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObjec
                           return surface.layer <= 0 && surface.object == part.own_solid();
                         });
                });
-  std::move(solids.begin(), solids.end(), std::back_inserter(collide));
   std::vector<Scene> shapes;
   for (const MovingObject& object : moving) {
     OwnParts own;
@@ -980,6 +1035,8 @@ Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObjec
     std::copy_if(parts.begin(), parts.end(), std::back_inserter(own.felt), is_own);
     std::copy_if(surfaces.begin(), surfaces.end(), std::back_inserter(own.surfaces), is_own);
     std::copy_if(collide.begin(), collide.end(), std::back_inserter(own.solid), is_own);
+    if (const auto whole = std::ranges::find_if(solids, is_own); whole != solids.end())
+      own.whole = &*whole;
     MovingBody body = make_body(object, own);
     check_limits(body);
     const Pose to_body = inverse(body.placed);
@@ -1003,6 +1060,10 @@ Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObjec
     std::copy_if(collide.begin(), collide.end(), std::back_inserter(own), is_of(part.object));
     world.obstacles.push_back(make_obstacle(own));
   }
+  for (const SceneSurface& surface : solids) {
+    if (!moves(surface)) world.obstacles.push_back(make_obstacle(surface));
+  }
+  meet_by_surface(world);
   world.pair_up();
   check_overlaps(world);
   std::vector<SceneObject> fixed = parts;

@@ -161,18 +161,18 @@ inline constexpr std::size_t kMostBodies = 64;
 /// \param gravity  m/s^2
 /// \param sleeps   bodies at rest are not moved until something comes near
 /// \param surfaces  of objects whose surface has no convex parts, at their first places; one each
-/// \param solids   convex parts of objects with surfaces, for collisions alone: the hand feels the
-/// surface. Without them such an object touches only the hand
+/// \param solids   whole surfaces of such objects, for collisions: without one, it touches only the
+/// hand
 /// \throws std::invalid_argument naming the object and the exceeded limit
 Scene moving_scene(std::vector<SceneObject> parts, const std::vector<MovingObject>& moving,
                    const Vec3& gravity, bool side_contact = true, const Tool& tool = {},
                    bool sleeps = true, std::vector<SceneSurface> surfaces = {},
-                   std::vector<SceneObject> solids = {});
+                   std::vector<SceneSurface> solids = {});
 
 /// Numbers of a scene's moving objects.
 struct MovingSummary {
   std::size_t bodies = 0, obstacles = 0;
-  std::size_t part_pairs = 0;         ///< of convex parts that may meet
+  std::size_t part_pairs = 0;         ///< of convex parts or surfaces that may meet
   double lightest = 0, heaviest = 0;  ///< kg
 };
 /// Empty if nothing moves as a rigid body, or if the scene has soft objects.

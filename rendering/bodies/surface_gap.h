@@ -1,0 +1,56 @@
+#pragma once
+// Where two closed surfaces are nearest to each other, and touch or soon will. World frame, m.
+// Nothing here allocates once there is room.
+
+#include <vector>
+
+#include "rendering/bodies/collision_surface.h"
+#include "stimuli/vec.h"
+
+namespace palpate::rendering {
+
+/// m; corners that are deeper inside the other surface are not seen.
+inline constexpr double kSeen = 1e-3;
+
+/// A surface at its present place.
+struct SurfacePlace {
+  const CollisionSurface* surface = nullptr;
+  Mat3 axes;      ///< rotation from its frame
+  Vec3 position;  ///< of its origin
+};
+
+/// A place where the distance is least among places nearby.
+struct NearPlace {
+  Vec3 place;      ///< half-way between the two
+  Vec3 normal;     ///< unit, from a to b
+  double gap = 0;  ///< negative: they overlap
+};
+
+/// The nearest places of two surfaces, and working memory.
+struct NearPlaces {
+  static constexpr std::size_t kMost = 4096, kMostChosen = 32;
+  std::vector<NearPlace> all, chosen;
+  bool dropped = false;  ///< there were more
+
+  void make_room();
+};
+
+/// The least gap of corners to faces, edges and corners, and of convex edges to each other, where
+/// each is the farthest of its surroundings towards the other (local minima of distance: Johnson &
+/// Willemsen 2003, Six degree-of-freedom haptic rendering of complex polygonal models; here with
+/// signs, so that overlaps of up to a millimetre have their depth).
+/// \param reach  m; farther apart is of no interest
+/// \return the least gap; if that is greater than `reach` and kSeen, the greater of these
+double gap_between(const SurfacePlace& a, const SurfacePlace& b, double reach);
+
+/// The same with the places within reach, of which `chosen` hold them apart as well as all: with
+/// each normal the nearest, and those that touch first in a turn. \param turn  rad, by which they
+/// may turn against each other: corners that are the farthest only then are places as well
+double find_places(const SurfacePlace& a, const SurfacePlace& b, double reach, double turn,
+                   NearPlaces& out);
+
+/// m; how deep the surfaces are inside each other: of corners, pieces of edges and middles of faces
+/// of each the one deepest inside the other. 0: they do not overlap. Slow.
+double overlap_of(const SurfacePlace& a, const SurfacePlace& b);
+
+}  // namespace palpate::rendering
