@@ -16,6 +16,7 @@
 #include "stimuli/convex_mesh.h"
 #include "stimuli/grid_hull.h"
 #include "stimuli/inset.h"
+#include "stimuli/layers/layer_surface.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
@@ -41,12 +42,16 @@ void add(const stimuli::ObjectSpec& spec, const Pose& parent, std::vector<Placed
   }
   const std::optional<double> depth = felt_depth(spec.material);
   if (!depth) return;
-  if (spec.shape == stimuli::ShapeKind::mesh && *depth == 0) {
+  if (spec.shape == stimuli::ShapeKind::mesh) {
     const stimuli::PolygonSoup soup = stimuli::polygons_of(spec);
     if (!stimuli::convex_as_it_is(soup)) {
+      stimuli::ClosedSurface surface = stimuli::closed_surface(soup).surface;
+      if (*depth > 0) {
+        const std::vector<stimuli::PlacedShell> shells = {{&surface, Pose{}}};
+        surface = stimuli::layer_surface(stimuli::SolidDepth(shells), *depth).surface;
+      }
       out.push_back(
-          {nullptr, pose,
-           std::make_shared<const stimuli::ClosedSurface>(stimuli::closed_surface(soup).surface)});
+          {nullptr, pose, std::make_shared<const stimuli::ClosedSurface>(std::move(surface))});
       return;
     }
   }

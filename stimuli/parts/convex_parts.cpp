@@ -1,10 +1,7 @@
 #include "stimuli/parts/convex_parts.h"
 
 #include <algorithm>
-#include <array>
-#include <cmath>
 #include <cstdint>
-#include <cstdio>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -12,45 +9,15 @@
 #include <string>
 #include <utility>
 
-#include "data/base/random.h"
-#include "stimuli/closed_surface.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/half_edges.h"
 #include "stimuli/mesh_names.h"
-#include "stimuli/parts/cell.h"
-#include "stimuli/parts/convex_sets.h"
-#include "stimuli/parts/facets.h"
+#include "stimuli/parts/triangle_surface.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::stimuli {
 namespace {
-
-constexpr int kPoints = 256;
-
-// m, how far a point is outside a part; negative inside.
-double out_of(const ConvexMesh& part, const Vec3& point) {
-  double most = -std::numeric_limits<double>::infinity();
-  for (const Facet& facet : part.facets())
-    most = std::max(most, glm::dot(facet.normal, point) - facet.offset);
-  return most;
-}
-
-void check_volume(const TriangleSurface& solid, const std::vector<ConvexMesh>& parts, double slack,
-                  MeshFaults& faults) {
-  const SolidBulk expected = bulk_of(solid);
-  double volume = 0;
-  for (const ConvexMesh& part : parts) volume += volume_of(part);
-  const double off = std::abs(volume - expected.volume);
-  if (off <= 1e-9 * expected.volume + slack * expected.area) return;
-  faults.add("not covered", [&] {
-    char text[160];
-    std::snprintf(text, sizeof text,
-                  "expected convex parts of %.9g m^3 in all, found %.9g m^3 in %zu parts",
-                  expected.volume, volume, parts.size());
-    return std::string(text) + "; does the surface pass through itself?";
-  });
-}
 
 using Index = std::uint32_t;
 
@@ -135,7 +102,7 @@ Solid solid_of(SolidGroup group) {
   return solid;
 }
 
-// Tests some corners only: cutting reports surfaces that cross elsewhere.
+// Tests some corners only.
 bool lies_in(const Solid& inner, const Solid& outer) {
   if (glm::any(glm::lessThan(inner.low, outer.low)) ||
       glm::any(glm::greaterThan(inner.high, outer.high)))
@@ -191,101 +158,6 @@ std::vector<SolidGroup> with_voids(std::vector<Solid> solids) {
   return groups;
 }
 
-// m, of the coordinates' error: facets are taken for plane within 8 errors, and a corner must not
-// lie on one of two facets that meet in it and miss the other.
-constexpr double kErrors = 16;
-
-// Neighbouring parts get the same corners, to the bit, those of the solid where there are some.
-std::vector<PolygonSoup> soups_of(const std::vector<std::vector<CellPolygon>>& parts,
-                                  const FacetedSolid& solid, double tolerance) {
-  std::vector<Vec3> points = solid.points;
-  for (const auto& faces : parts) {
-    for (const CellPolygon& face : faces)
-      points.insert(points.end(), face.corners.begin(), face.corners.end());
-  }
-  const std::vector<std::uint32_t> kept = weld(points, tolerance);
-  std::size_t next = solid.points.size();
-  std::vector<PolygonSoup> soups;
-  for (const auto& faces : parts) {
-    PolygonSoup soup;
-    soup.coordinate_error = solid.error;
-    soup.names = std::make_shared<const MeshNames>();  // messages name no vertex numbers
-    for (const CellPolygon& face : faces) {
-      std::vector<std::uint32_t> polygon;
-      for (std::size_t k = 0; k < face.corners.size(); ++k) {
-        polygon.push_back(static_cast<std::uint32_t>(soup.vertices.size()));
-        soup.vertices.push_back(points[kept[next++]]);
-      }
-      soup.faces.push_back(std::move(polygon));
-    }
-    soups.push_back(std::move(soup));
-  }
-  return soups;
-}
-
-void check_inside_out(const FacetedSolid& solid, MeshFaults& faults) {
-  const SolidBulk bulk = bulk_of(solid.triangles);
-  if (bulk.volume > 2 * solid.error * bulk.area) return;
-  if (bulk.volume < -2 * solid.error * bulk.area) {
-    faults.add("inside out", [] {
-      return "all faces are clockwise seen from outside; expected counter-clockwise";
-    });
-  } else {
-    faults.add("flat", [] { return "expected a solid, found no volume"; });
-  }
-}
-
-std::vector<ConvexMesh> one_part(const PolygonSoup& soup) {
-  try {
-    std::vector<ConvexMesh> one;
-    one.emplace_back(soup);
-    return one;
-  } catch (const MeshError&) {
-    return cut_into_convex_parts(soup);
-  }
-}
-
-/// \param is_surface  set where the faces are a surface, whether or not it can be cut
-std::vector<ConvexMesh> cut_once(const PolygonSoup& soup, bool& is_surface) {
-  MeshFaults faults;
-  const HalfEdges mesh = link_half_edges(soup, faults, Pieces::any);
-  faults.throw_if_any();
-  is_surface = true;
-  PlaneTable planes(kErrors * mesh.error);
-  const FacetedSolid solid = faceted_solid(mesh, planes, faults);
-  faults.throw_if_any();
-  check_inside_out(solid, faults);
-  faults.throw_if_any();
-  std::vector<std::vector<CellPolygon>> cells = cut_at_concave_edges(solid, planes, faults);
-  faults.throw_if_any();
-  merge_convex_neighbours(cells, planes);
-  std::vector<ConvexMesh> parts;
-  for (const PolygonSoup& part : soups_of(cells, solid, 2 * planes.tolerance())) {
-    try {
-      parts.emplace_back(part);
-    } catch (const MeshError& error) {
-      faults.add("not convex", [&] {
-        return "after cutting, part " + std::to_string(parts.size() + 1) +
-               " is not convex: " + error.faults()[0];
-      });
-    }
-  }
-  faults.throw_if_any();
-  check_cover(solid.triangles, parts, kErrors * soup.coordinate_error, faults);
-  faults.throw_if_any();
-  return parts;
-}
-
-// m; diagonal of the bounding box.
-double diagonal_of(const PolygonSoup& soup) {
-  Vec3 low(std::numeric_limits<double>::max()), high = -low;
-  for (const Vec3& v : soup.vertices) {
-    low = glm::min(low, v);
-    high = glm::max(high, v);
-  }
-  return glm::length(high - low);
-}
-
 }  // namespace
 
 double volume_of(const ConvexMesh& mesh) {
@@ -301,43 +173,6 @@ double volume_of(const ConvexMesh& mesh) {
       volume += glm::dot(first, glm::cross(corner(k - 1), corner(k))) / 6;
   }
   return volume;
-}
-
-void check_cover(const TriangleSurface& solid, const std::vector<ConvexMesh>& parts, double slack,
-                 MeshFaults& faults) {
-  check_volume(solid, parts, slack, faults);
-  Vec3 low = solid[0][0], high = low;
-  for (const auto& triangle : solid) {
-    for (const Vec3& corner : triangle) {
-      low = glm::min(low, corner);
-      high = glm::max(high, corner);
-    }
-  }
-  const double near = 1e-6 * glm::length(high - low);  // of a surface: either answer is right
-  Random random(1);
-  for (int i = 0; i < kPoints; ++i) {
-    Vec3 point;
-    for (int axis = 0; axis < 3; ++axis)
-      point[axis] = low[axis] + (high[axis] - low[axis]) * random.unit();
-    int in = 0;
-    bool doubtful = false;
-    for (const ConvexMesh& part : parts) {
-      const double out = out_of(part, point);
-      doubtful |= std::abs(out) < near;
-      in += out < 0 ? 1 : 0;
-    }
-    const double winding = winding_number(solid, point);
-    if (doubtful || std::abs(winding - in) < 0.01) continue;
-    faults.add("not covered", [&] {
-      char text[200];
-      std::snprintf(
-          text, sizeof text,
-          "the point (%.4g, %.4g, %.4g) m lies in %d of the convex parts, but the surface "
-          "winds round it %.2f times",
-          point.x, point.y, point.z, in, winding);
-      return std::string(text);
-    });
-  }
 }
 
 std::vector<SolidGroup> solid_groups(const PolygonSoup& soup) {
@@ -372,44 +207,20 @@ std::vector<SolidGroup> solid_groups(const PolygonSoup& soup) {
   return with_voids(std::move(closed));
 }
 
-std::vector<ConvexMesh> cut_into_convex_parts(const PolygonSoup& soup) {
-  // A file may show more digits than it has, and planes that meet at small angles miss corners by
-  // more than the digits: then it is read as less exact.
-  constexpr std::array kShares = {1e-7, 1e-6, 1e-5};  // of the size
-  bool is_surface = false;
-  try {
-    return cut_once(soup, is_surface);
-  } catch (const MeshError&) {
-    if (!is_surface) throw;
-    PolygonSoup rough = soup;
-    const double size = diagonal_of(soup);
-    for (const double share : kShares) {
-      if (!(share * size > 2 * soup.coordinate_error)) continue;
-      rough.coordinate_error = share * size;
-      try {
-        return cut_once(rough, is_surface);
-      } catch (const MeshError&) {
-        // The first one says what is wrong.
-      }
-    }
-    throw;
-  }
-}
-
 std::vector<ConvexMesh> convex_parts(const PolygonSoup& soup) {
   std::vector<ConvexMesh> parts;
+  std::vector<SolidGroup> groups;
   try {
     parts.emplace_back(soup);
     return parts;
   } catch (const MeshError&) {
-    // Not convex, or broken: the steps below report it.
+    groups = solid_groups(soup);
+    if (groups.empty()) throw;
   }
-  const std::vector<SolidGroup> groups = solid_groups(soup);
-  if (groups.empty()) return cut_into_convex_parts(soup);
   std::vector<std::string> faults;
   for (const SolidGroup& group : groups) {
     try {
-      for (ConvexMesh& part : one_part(group.soup)) parts.push_back(std::move(part));
+      parts.emplace_back(group.soup);
     } catch (const MeshError& error) {
       for (const std::string& fault : error.faults()) faults.push_back(group.name + ": " + fault);
     }

@@ -1,12 +1,10 @@
 #pragma once
-// Any closed solid as convex parts, as the renderers need them.
+// What a primitive or the groups of a mesh file give as convex parts.
 
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "stimuli/mesh_names.h"
-#include "stimuli/parts/cell.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/shapes.h"
 
@@ -14,15 +12,8 @@ namespace palpate::stimuli {
 
 class ConvexMesh;
 
-// Checks that convex parts cover a solid exactly.
-
 /// m^3
 double volume_of(const ConvexMesh& mesh);
-
-/// Adds a fault where the volumes do not add up (within 1e-9 of the volume and `slack`, m, times
-/// the area) or where a sampled point lies in more or fewer parts than it should.
-void check_cover(const TriangleSurface& solid, const std::vector<ConvexMesh>& parts, double slack,
-                 MeshFaults& faults);
 
 // The groups of a mesh file that are solids of their own.
 
@@ -42,27 +33,16 @@ std::vector<SolidGroup> solid_groups(const PolygonSoup& soup);
 
 /// The convex parts of a primitive or mesh file in its local frame: one of a convex shape, the very
 /// mesh that ConvexMesh makes of it. Groups of a file that are closed by themselves are parts; they
-/// may overlap. What is not convex is cut (cut_into_convex_parts).
-/// \throws MeshError naming the group where there are several; std::runtime_error for an unreadable
-/// file; std::invalid_argument for a compound.
+/// may overlap.
+/// \throws MeshError: a group, or a file without groups, is not convex or not a solid;
+/// std::runtime_error for an unreadable file; std::invalid_argument for a compound.
 std::vector<ConvexMesh> convex_parts(const ObjectSpec& spec);
 
 /// The same for polygons.
 std::vector<ConvexMesh> convex_parts(const PolygonSoup& soup);
 
-/// The same without cutting: nullopt where a group, or a file without groups, is not convex or not
-/// a solid.
+/// The same; nullopt where something is not convex or not a solid.
 std::optional<std::vector<ConvexMesh>> convex_as_it_is(const PolygonSoup& soup);
-
-/// Cuts a closed solid, which may have holes, voids and several pieces, at its concave edges into
-/// convex parts with disjoint interiors. Before it returns, the parts are checked against the
-/// surface: their volumes must add up to its volume (divergence theorem) within 1e-9 and the error
-/// of the coordinates times the area, and of 256 points each must lie in as many parts as the
-/// surface winds round it, 0 or 1. A surface that cannot be cut is tried again with coordinates
-/// less exact than it says (to 1e-5 of its size). \throws MeshError: not closed, turned or crossed
-/// faces, a surface that passes through itself, too many concave edges (kMostConcaveEdges) or parts
-/// (kMostParts), parts that do not add up
-std::vector<ConvexMesh> cut_into_convex_parts(const PolygonSoup& soup);
 
 // Overlaps of convex parts. One frame for all parts, SI units.
 

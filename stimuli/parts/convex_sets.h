@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "stimuli/inset.h"
-#include "stimuli/parts/cell.h"
+#include "stimuli/vec.h"
 
 namespace palpate::stimuli {
 
@@ -60,11 +60,5 @@ class SetGrowth {
 
   double abuts_, tolerance_ = 0;
 };
-
-/// Joining convex neighbours whose union is convex.
-/// Polyhedra with disjoint interiors, fewer or as many as before: any two that share a plane and
-/// whose union is convex become one, until there are none. Not the fewest possible.
-void merge_convex_neighbours(std::vector<std::vector<CellPolygon>>& parts,
-                             const PlaneTable& planes);
 
 }  // namespace palpate::stimuli

@@ -131,11 +131,10 @@ std::vector<std::string> group_overlaps(const ObjectSpec& spec) {
   }
   std::vector<std::string> sentences = largest_of(std::move(overlaps));
   if (unknown.size() == 1) {
-    sentences.push_back(unknown.front() +
-                        " falls into no convex parts: where it overlaps others is not known");
+    sentences.push_back(unknown.front() + " is not convex: where it overlaps others is not known");
   } else if (!unknown.empty()) {
     sentences.push_back(unknown.front() + " and " + std::to_string(unknown.size() - 1) +
-                        " more groups fall into no convex parts: where they overlap is not known");
+                        " more groups are not convex: where they overlap is not known");
   }
   return sentences;
 }

@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cstdlib>
 #include <memory>
+#include <optional>
 #include <utility>
 #include <vector>
 
+#include "rendering/surface.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/parts/convex_parts.h"
@@ -16,9 +18,10 @@
 namespace palpate::testing {
 
 /// Whatever polygons there are: they are refused with the reason, or every side has a neighbour.
-inline void close_surface(const stimuli::PolygonSoup& soup) {
+/// \return nullopt: refused
+inline std::optional<stimuli::ClosedSurface> close_surface(const stimuli::PolygonSoup& soup) {
   try {
-    const stimuli::ClosedSurface surface = stimuli::closed_surface(soup).surface;
+    stimuli::ClosedSurface surface = stimuli::closed_surface(soup).surface;
     for (std::size_t t = 0; t < surface.triangles.size(); ++t) {
       for (std::size_t k = 0; k < 3; ++k) {
         const auto& other = surface.triangles.at(surface.across[t][k]);
@@ -28,7 +31,9 @@ inline void close_surface(const stimuli::PolygonSoup& soup) {
           std::abort();
       }
     }
+    return surface;
   } catch (const stimuli::MeshError&) {
+    return std::nullopt;
   }
 }
 
@@ -36,16 +41,26 @@ inline void close_surface(const stimuli::PolygonSoup& soup) {
 inline void feel_mesh_file(const std::string& path) {
   try {
     const stimuli::PolygonSoup soup = stimuli::read_mesh_file(path);
-    close_surface(soup);
+    std::optional<stimuli::ClosedSurface> closed = close_surface(soup);
     std::vector<rendering::SceneObject> parts;
-    for (stimuli::ConvexMesh& part : stimuli::convex_parts(soup)) {
-      rendering::SceneObject object;
-      object.mesh = std::make_shared<const stimuli::ConvexMesh>(std::move(part));
-      parts.push_back(std::move(object));
+    std::vector<rendering::SceneSurface> surfaces;
+    if (auto convex = stimuli::convex_as_it_is(soup)) {
+      for (stimuli::ConvexMesh& part : *convex) {
+        rendering::SceneObject object;
+        object.mesh = std::make_shared<const stimuli::ConvexMesh>(std::move(part));
+        parts.push_back(std::move(object));
+      }
+    } else if (closed) {
+      stimuli::Material material;
+      material.stiffness = 1000;
+      const std::vector<rendering::SurfaceShell> shells = {
+          {std::make_shared<const stimuli::ClosedSurface>(std::move(*closed)), Pose{}, material,
+           0}};
+      surfaces.push_back({std::make_shared<const rendering::Surface>(shells), Pose{}, 0, {}});
     }
     for (const rendering::Renderer* renderer :
          {&rendering::point_renderer(), &rendering::ray_renderer()}) {
-      feel(rendering::Scene(parts, renderer->side_contact()), *renderer);
+      feel(rendering::Scene(parts, renderer->side_contact(), {}, nullptr, surfaces), *renderer);
     }
   } catch (const stimuli::MeshError&) {
   }

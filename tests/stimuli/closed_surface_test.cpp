@@ -16,7 +16,7 @@
 #include "data/base/random.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/orientation.h"
-#include "stimuli/parts/cell.h"
+#include "stimuli/parts/triangle_surface.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "tests/shared/random_polyhedron.h"

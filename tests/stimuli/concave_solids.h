@@ -15,6 +15,7 @@
 #include "data/base/random.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/orientation.h"
+#include "stimuli/primitives.h"
 
 namespace palpate::stimuli::solids {
 
@@ -67,43 +68,46 @@ inline Solid prism(const Outline& outline, double height) {
   return solid;
 }
 
-inline Solid l_shape() {
-  return prism({{0, 0}, {0.06, 0}, {0.06, 0.02}, {0.02, 0.02}, {0.02, 0.06}, {0, 0.06}}, 0.03);
+/// The boxes of a prism whose outline has sides along x and y only: disjoint, abutting.
+inline std::vector<PolygonSoup> slabs(const Outline& outline, double height) {
+  std::set<double> ys;
+  for (const auto& corner : outline) ys.insert(corner[1]);
+  std::vector<PolygonSoup> boxes;
+  for (auto low = ys.begin(); std::next(low) != ys.end(); ++low) {
+    const double middle = (*low + *std::next(low)) / 2;
+    std::set<double> xs;
+    for (std::size_t k = 0; k < outline.size(); ++k) {
+      const auto &a = outline[k], &b = outline[(k + 1) % outline.size()];
+      if ((a[1] > middle) != (b[1] > middle)) xs.insert(a[0]);
+    }
+    for (auto x = xs.begin(); x != xs.end(); x = std::next(x, 2)) {
+      PolygonSoup box = cube(1);
+      for (Vec3& v : box.vertices) {
+        v = {v.x < 0 ? *x : *std::next(x), v.y < 0 ? *low : *std::next(low), v.z < 0 ? 0 : height};
+      }
+      boxes.push_back(std::move(box));
+    }
+  }
+  return boxes;
 }
-inline Solid u_shape() {
-  return prism({{0, 0},
-                {0.06, 0},
-                {0.06, 0.05},
-                {0.04, 0.05},
-                {0.04, 0.02},
-                {0.02, 0.02},
-                {0.02, 0.05},
-                {0, 0.05}},
-               0.03);
-}
-inline Solid plus_shape() {
-  return prism({{-1, -3},
-                {1, -3},
-                {1, -1},
-                {3, -1},
-                {3, 1},
-                {1, 1},
-                {1, 3},
-                {-1, 3},
-                {-1, 1},
-                {-3, 1},
-                {-3, -1},
-                {-1, -1}},
-               2);
-}
-inline Solid stair(int steps) {
+
+inline const Outline kL = {{0, 0}, {0.06, 0}, {0.06, 0.02}, {0.02, 0.02}, {0.02, 0.06}, {0, 0.06}};
+inline Solid l_shape() { return prism(kL, 0.03); }
+inline const Outline kU = {{0, 0},       {0.06, 0},    {0.06, 0.05}, {0.04, 0.05},
+                           {0.04, 0.02}, {0.02, 0.02}, {0.02, 0.05}, {0, 0.05}};
+inline Solid u_shape() { return prism(kU, 0.03); }
+inline const Outline kPlus = {{-1, -3}, {1, -3}, {1, -1}, {3, -1}, {3, 1},   {1, 1},
+                              {1, 3},   {-1, 3}, {-1, 1}, {-3, 1}, {-3, -1}, {-1, -1}};
+inline Solid plus_shape() { return prism(kPlus, 2); }
+inline Outline stair_outline(int steps) {
   Outline outline{{0, 0}, {0.1, 0}};
   for (int k = 0; k < steps; ++k) {
     outline.push_back({0.1 - 0.1 * k / steps, 0.08 * (k + 1) / steps});
     outline.push_back({0.1 - 0.1 * (k + 1) / steps, 0.08 * (k + 1) / steps});
   }
-  return prism(outline, 0.05);
+  return outline;
 }
+inline Solid stair(int steps) { return prism(stair_outline(steps), 0.05); }
 
 /// An outline that is a star seen from the origin: no side crosses another.
 inline Outline random_outline(Random& random, int corners) {
@@ -138,6 +142,32 @@ inline Solid torus(double ring, double tube, int around, int corners) {
   const double section = corners / 2.0 * tube * tube * std::sin(2 * std::numbers::pi / corners);
   solid.volume = around * section * ring * std::sin(2 * std::numbers::pi / around);
   return solid;
+}
+
+/// Its sections, each convex.
+inline std::vector<PolygonSoup> torus_sections(double ring, double tube, int around, int corners) {
+  const PolygonSoup whole = torus(ring, tube, around, corners).soup;
+  std::vector<PolygonSoup> sections;
+  for (int i = 0; i < around; ++i) {
+    PolygonSoup& section = sections.emplace_back();
+    std::vector<std::uint32_t> near, far;
+    for (int end = 0; end < 2; ++end) {
+      for (int j = 0; j < corners; ++j)
+        section.vertices.push_back(
+            whole.vertices[static_cast<std::size_t>((i + end) % around * corners + j)]);
+    }
+    for (int j = 0; j < corners; ++j) {
+      const auto a = static_cast<std::uint32_t>(j),
+                 b = static_cast<std::uint32_t>((j + 1) % corners),
+                 n = static_cast<std::uint32_t>(corners);
+      section.faces.push_back({a, n + a, n + b, b});
+      near.push_back(a);
+      far.insert(far.begin(), n + a);
+    }
+    section.faces.push_back(near);
+    section.faces.push_back(far);
+  }
+  return sections;
 }
 
 /// Boxes of an irregular grid, chosen by `filled`, with faces between filled and empty ones. Only

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "stimuli/convex_mesh.h"
-#include "stimuli/parts/facets.h"
+#include "stimuli/face_triangles.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "stimuli/shapes.h"
@@ -28,12 +28,12 @@ void add(const stimuli::PolygonSoup& soup, const Pose& pose, DrawnMesh& out) {
     corners.clear();
     for (const std::uint32_t corner : face)
       corners.push_back(pose.orientation * soup.vertices[corner] + pose.position);
-    for (const auto& triangle : stimuli::triangulate(corners)) {
-      const Vec3 across = glm::cross(triangle[1] - triangle[0], triangle[2] - triangle[0]);
+    for (const auto& [a, b, c] : stimuli::face_triangles(corners)) {
+      const Vec3 across = glm::cross(corners[b] - corners[a], corners[c] - corners[a]);
       const double area = glm::length(across);
       if (!(area > 0)) continue;
       const glm::vec3 normal(across / area);
-      for (const Vec3& corner : triangle) out.push_back({glm::vec3(corner), normal});
+      for (const std::uint32_t k : {a, b, c}) out.push_back({glm::vec3(corners[k]), normal});
     }
   }
 }

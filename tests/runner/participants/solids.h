@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "runner/participants/distance_field.h"
+#include "stimuli/closed_surface.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/polygon_soup.h"
 #include "tests/stimuli/concave_solids.h"
@@ -13,12 +14,17 @@
 namespace palpate::runner::participants::test {
 
 inline std::vector<PlacedPart> placed(const stimuli::PolygonSoup& soup, const Vec3& shift = {}) {
-  std::vector<PlacedPart> parts;
-  for (stimuli::ConvexMesh& part : stimuli::convex_parts(soup)) {
-    parts.push_back(
-        {std::make_shared<const stimuli::ConvexMesh>(std::move(part)), {shift, Quat(1, 0, 0, 0)}});
+  const Pose pose{shift, Quat(1, 0, 0, 0)};
+  std::vector<PlacedPart> placed;
+  if (auto parts = stimuli::convex_as_it_is(soup)) {
+    for (stimuli::ConvexMesh& part : *parts)
+      placed.push_back({std::make_shared<const stimuli::ConvexMesh>(std::move(part)), pose});
+  } else {
+    placed.push_back(
+        {nullptr, pose,
+         std::make_shared<const stimuli::ClosedSurface>(stimuli::closed_surface(soup).surface)});
   }
-  return parts;
+  return placed;
 }
 
 inline double distance_at(const DistanceField& field, const Vec3& p) {

@@ -11,9 +11,9 @@
 
 #include "data/base/random.h"
 #include "stimuli/convex_mesh.h"
+#include "stimuli/face_triangles.h"
 #include "stimuli/inset.h"
-#include "stimuli/parts/convex_parts.h"
-#include "stimuli/parts/facets.h"
+#include "stimuli/parts/triangle_surface.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "tests/stimuli/concave_solids.h"
@@ -22,13 +22,6 @@ namespace palpate::stimuli {
 namespace {
 
 using MeshPointer = std::shared_ptr<const ConvexMesh>;
-
-std::vector<MeshPointer> pointers(std::vector<ConvexMesh> meshes) {
-  std::vector<MeshPointer> out;
-  for (ConvexMesh& mesh : meshes)
-    out.push_back(std::make_shared<const ConvexMesh>(std::move(mesh)));
-  return out;
-}
 
 bool holds(const std::vector<MeshPointer>& meshes, const Vec3& p, double slack) {
   return std::any_of(meshes.begin(), meshes.end(), [&](const MeshPointer& mesh) {
@@ -50,8 +43,8 @@ class Surface {
     for (const auto& face : soup.faces) {
       std::vector<Vec3> corners;
       for (const std::uint32_t v : face) corners.push_back(soup.vertices[v]);
-      const TriangleSurface cut = triangulate(corners);
-      triangles_.insert(triangles_.end(), cut.begin(), cut.end());
+      for (const auto& [a, b, c] : face_triangles(corners))
+        triangles_.push_back({corners[a], corners[b], corners[c]});
     }
   }
 
@@ -128,43 +121,34 @@ LayerPoints compare(const solids::Solid& solid, const std::vector<MeshPointer>& 
   return counts;
 }
 
-LayerPoints compare_cut(const solids::Solid& solid, double depth, int points = 3000) {
-  return compare(solid, pointers(cut_into_convex_parts(solid.soup)), depth, points);
+std::vector<MeshPointer> pointers(const std::vector<PolygonSoup>& soups) {
+  std::vector<MeshPointer> out;
+  for (const PolygonSoup& soup : soups) out.push_back(std::make_shared<const ConvexMesh>(soup));
+  return out;
 }
 
-TEST(InsetUnion, CutSolidsHoldTheDeeperPoints) {
+TEST(InsetUnion, AbuttingPartsHoldTheDeeperPoints) {
+  const auto compare_slabs = [](const solids::Outline& outline, double height, double depth) {
+    return compare(solids::prism(outline, height), pointers(solids::slabs(outline, height)), depth,
+                   3000);
+  };
   for (const double depth : {0.0005, 0.002, 0.005}) {
-    const LayerPoints l = compare_cut(solids::l_shape(), depth);
+    const LayerPoints l = compare_slabs(solids::kL, 0.03, depth);
     EXPECT_GT(l.in, 500);
     EXPECT_LT(l.round, 0.01 * (l.in + l.out));
-    compare_cut(solids::u_shape(), depth);
-    compare_cut(solids::stair(4), depth);
-    compare_cut(solids::plus_shape(), 50 * depth);
+    compare_slabs(solids::kU, 0.03, depth);
+    compare_slabs(solids::stair_outline(4), 0.05, depth);
+    compare_slabs(solids::kPlus, 2, 50 * depth);
   }
 }
 
 TEST(InsetUnion, TorusStaysATorus) {
   for (const double depth : {0.001, 0.004}) {
-    const LayerPoints counts = compare_cut(solids::torus(0.03, 0.01, 12, 8), depth, 1500);
+    const LayerPoints counts =
+        compare(solids::torus(0.03, 0.01, 12, 8),
+                pointers(solids::torus_sections(0.03, 0.01, 12, 8)), depth, 1500);
     EXPECT_GT(counts.in, 100);
   }
-}
-
-TEST(InsetUnion, StarsWithSharpNotchesHoldTheDeeperPoints) {
-  constexpr std::uint64_t kSeed = 9;
-  Random random(kSeed);
-  int made = 0;
-  for (int i = 0; i < 12; ++i) {
-    const solids::Solid star = solids::prism(solids::random_outline(random, 5 + i % 4), 0.03);
-    const double depth = 0.001 + 0.003 * random.unit();
-    try {
-      compare_cut(star, depth, 1000);
-      ++made;
-    } catch (const MeshError& error) {
-      EXPECT_NE(error.faults()[0].find("no layer"), std::string::npos) << error.what();
-    }
-  }
-  EXPECT_GE(made, 10);
 }
 
 PolygonSoup box(const Vec3& low, const Vec3& high) {
