@@ -114,7 +114,7 @@ PUBLIC = {
     "rendering": "field_demand fields first_contact probe reach render_fault renderer scene tool",
     "rendering/bodies": "moving_scene",
     "runner/evidence/verification": "explain extreme_cases random_solids reference search surface_reference union_cases",
-    "runner/evidence/scenes": "feature_costs scene_study",
+    "runner/evidence/scenes": "feature_costs scene_study stage_costs tick_costs",
     "runner/evidence/accuracy": "body_study methods paper_first_contact peers study union_study",
     "rendering/bodies/soft": "soft_scene",
     "protocols": "answer_keys difference factors groups json_document parse protocol schedule session_plan sight sound sweep_space "
@@ -151,7 +151,7 @@ PUBLIC = {
                       "preflight run_record replay session session_end simulated_study "
                       "socket_advisor station",
     "runner/output": "outputs progress_line",
-    "runner/station": "admission lag_check opening protocol_check protocol_choice run_settings sound_timing",
+    "runner/station": "admission lag_check opening protocol_check protocol_choice run_settings servo_timing sound_timing",
     "runner/touch": "checked_meshes forces live_touch scene_notes trial_page",
     "runner/movement": "movement_study touched_trial",
     "runner/evidence/reports": "accuracy_report boundary_report scene_report stability_report stability_study",
@@ -161,7 +161,7 @@ PUBLIC = {
     "runner/design": "design_page protocol_file rehearsal",
     "runner/sweep": "cluster_folder cluster_job design slurm swept_study",
     "runner/evidence/stability": "boundary effect_stability scene_boundary",
-    "runner/evidence": "tick_meters",
+    "runner/evidence": "",
     "runner/commands": "shared/command",
 }
 
