@@ -64,7 +64,7 @@ MAY_INCLUDE = {
     "runner/output": {"stimuli", "data", "data/files", "runner"},
     # Who takes part, with what.
     "runner/station": SERVO | {"protocols", "data", "data/files", "data/store", "runner/safety", "runner/devices", "runner/display",
-                               "runner/participants", "runner/session", "runner/sound"},
+                               "runner/participants", "runner/session", "runner/sound", "runner/study"},
     "runner/touch": SERVO | {"protocols", "data", "data/files", "data/store", "analysis", "analysis/figures", "analysis/input",
                              "analysis/report", "runner/safety", "runner/output", "runner/session", "runner/display",
                              "runner/display/scene", "runner/serve", "runner/station"},
@@ -145,7 +145,7 @@ PUBLIC = {
     "runner/display": "display explore_window mailbox seen text_display timeline window",
     "runner/display/scene": "camera gl_objects picture drawn_mesh image_file painter scene_drawing "
                             "scene_renderer",
-    "runner/participants": "keyboard reacher respondent seen_record seen_trial simulated_settings simulated "
+    "runner/participants": "keyboard reacher respondent response_box seen_record seen_trial simulated_settings simulated "
                            "task_participant",
     "runner/session": "device_check effect_check live_forces live_session markers recorded_outcome sample_stream session_scenes signals "
                       "preflight run_record replay session session_end simulated_study "

@@ -20,6 +20,7 @@
 #include "data/base/json_text.h"
 #include "data/base/text.h"
 #include "protocols/schedule.h"
+#include "protocols/session_plan.h"
 #include "runner/commands/shared/study_options.h"
 #include "runner/session/run_record.h"
 #include "runner/session/simulated_study.h"
@@ -327,7 +328,7 @@ class TaskFigures final : public PointFigures {
 /// \param plan  must outlive it
 std::unique_ptr<PointFigures> figures_for(const protocols::Protocol& protocol,
                                           const data::SweepPlan& plan) {
-  if (protocols::study_of_shapes(protocol)) return std::make_unique<ShapeFigures>(plan);
+  if (protocols::is_study_of_shapes(protocol)) return std::make_unique<ShapeFigures>(plan);
   return std::make_unique<TaskFigures>(plan, protocol.groups.unmasked());
 }
 
