@@ -60,7 +60,8 @@ MAY_INCLUDE = {
     "runner/design": SERVO | {"protocols", "data", "data/files", "data/store", "analysis", "analysis/input", "analysis/report",
                               "analysis/statistics", "runner/participants", "runner/serve", "runner/session", "runner/station",
                               "runner/study", "runner/touch"},
-    "runner/sweep": SERVO | {"protocols", "data", "data/files", "data/store", "runner/output", "runner/participants", "runner/session"},
+    "runner/sweep": SERVO | {"protocols", "data", "data/files", "data/store", "analysis/input", "analysis/statistics", "runner/output",
+                            "runner/participants", "runner/session"},
     "runner/output": {"stimuli", "data", "data/files", "runner"},
     # Who takes part, with what.
     "runner/station": SERVO | {"protocols", "data", "data/files", "data/store", "runner/safety", "runner/devices", "runner/display",
@@ -159,7 +160,7 @@ PUBLIC = {
     "runner/study": "cue_study export_settings schedule_text simulation_limits study_order study_trials task_words",
     "runner/serve": "loopback network page_server served_scene served_session",
     "runner/design": "design_page protocol_file rehearsal",
-    "runner/sweep": "cluster_folder cluster_job design slurm swept_study",
+    "runner/sweep": "cluster_folder cluster_job planned_sweep slurm",
     "runner/evidence/stability": "boundary effect_stability scene_boundary",
     "runner/evidence": "",
     "runner/commands": "shared/command",
