@@ -159,10 +159,9 @@ StoredProtocol read_stored_protocol(const std::string& text) {
   return out;
 }
 
-bool have_blocks(const std::vector<ProtocolInfo>& protocols) {
-  return std::ranges::any_of(protocols, [](const ProtocolInfo& protocol) {
-    return !read_stored_protocol(protocol.text).blocks.empty();
-  });
+bool have_blocks(const std::vector<std::string>& texts) {
+  return std::ranges::any_of(
+      texts, [](const std::string& text) { return !read_stored_protocol(text).blocks.empty(); });
 }
 
 }  // namespace palpate::data

@@ -52,6 +52,6 @@ struct StoredProtocol {
 StoredProtocol read_stored_protocol(const std::string& text);
 
 /// Whether any of them has blocks of tasks.
-bool have_blocks(const std::vector<ProtocolInfo>& protocols);
+bool have_blocks(const std::vector<std::string>& texts);
 
 }  // namespace palpate::data

@@ -21,6 +21,7 @@
 #include "protocols/parse_tool.h"
 #include "protocols/protocol.h"
 #include "protocols/schedule.h"
+#include "protocols/session_plan.h"
 #include "protocols/tasks/parse_blocks.h"
 #include "protocols/tested_effects.h"
 
@@ -36,8 +37,6 @@ struct Patches {
   std::vector<json> of_groups;
   bool masked = false;  ///< names of groups
 };
-
-using CheckServo = void (*)(ObjectReader& servo, const Protocol&);
 
 /// The stimulus that a key stands for: its name, or an object of name and label. Not a string, and
 /// a fault, otherwise.
@@ -271,10 +270,21 @@ void read_renderer_order(ObjectReader& reader, Protocol& protocol) {
                  {"interleaved", RendererOrder::interleaved}});
 }
 
+/// No page and no interval shows them.
+void remove_task_texts(Protocol::Texts& texts) {
+  for (std::string* const text :
+       {&texts.next_interval, &texts.answer_now, &texts.type_number, &texts.agree, &texts.disagree,
+        &texts.other_number, &texts.answer_first})
+    text->clear();
+}
+
 /// What version 1 says of the one task that it has.
 void read_identification(ObjectReader& reader, Protocol& protocol, const MeshFiles&, Patches&) {
   reader.integer("repetitions", protocol.repetitions, kRepetitions, Presence::required);
   protocol.blocks = {shapes_block(protocol)};
+  protocol.order_rule = &order_of_shapes();
+  protocol.home.beyond_all = protocol.materials_vary = false;
+  remove_task_texts(protocol.texts);
   reader.section("order", [&](ObjectReader& section) {
     section.choice("kind", protocol.order.kind,
                    {{"random", OrderKind::random}, {"sequential", OrderKind::sequential}});
@@ -307,16 +317,14 @@ void read_tasks(ObjectReader& reader, Protocol& protocol, const MeshFiles& files
   read_tested_effects(reader, protocol);
 }
 
-void accept_material_limit(ObjectReader&, const Protocol&) {}
-
-void refuse_material_limit(ObjectReader& servo, const Protocol& protocol) {
-  if (protocol.material_limit != MaterialLimit::limit) return;
+void check_material_limit(ObjectReader& servo, const Protocol& protocol) {
+  if (!protocol.materials_vary || protocol.material_limit != MaterialLimit::limit) return;
   servo.faults().add(servo.pointer("material_limit"),
                      "expected 'refuse' in version 2: a level that the device limits would not be "
                      "the one on record");
 }
 
-void read_apparatus(ObjectReader& reader, Protocol& protocol, CheckServo check_servo) {
+void read_apparatus(ObjectReader& reader, Protocol& protocol) {
   reader.section("stylus", [&](ObjectReader& section) {
     section.number("length_m", protocol.stylus.length, {0, 10, "m", true});
     section.number("grip_m", protocol.stylus.grip, {0, 10, "m"});
@@ -338,7 +346,7 @@ void read_apparatus(ObjectReader& reader, Protocol& protocol, CheckServo check_s
     section.boolean("passivity_controller", protocol.passivity_controller);
     section.choice("material_limit", protocol.material_limit,
                    {{"refuse", MaterialLimit::refuse}, {"limit", MaterialLimit::limit}});
-    check_servo(section, protocol);
+    check_material_limit(section, protocol);
   });
   reader.choice("torque", protocol.torque,
                 {{"required", TorqueRule::required}, {"left_out", TorqueRule::left_out}});
@@ -393,13 +401,12 @@ void fix_renderer_order(ObjectReader&, Protocol& protocol) {
 struct VersionRules {
   void (*read_order_of_renderers)(ObjectReader&, Protocol&);
   void (*read_study)(ObjectReader&, Protocol&, const MeshFiles&, Patches&);
-  CheckServo check_servo;
   void (*check)(const Protocol&, FaultList&);
 };
 
 constexpr std::array<VersionRules, 2> kVersions = {
-    {{read_renderer_order, read_identification, accept_material_limit, check_schedule},
-     {fix_renderer_order, read_tasks, refuse_material_limit, check_blocks}}};
+    {{read_renderer_order, read_identification, check_schedule},
+     {fix_renderer_order, read_tasks, check_blocks}}};
 
 Protocol read_design(const json& root, const MeshFiles& files, FaultList& faults,
                      Patches& patches) {
@@ -417,7 +424,7 @@ Protocol read_design(const json& root, const MeshFiles& files, FaultList& faults
                  [&](ObjectReader& section) { read_material(section, protocol.material); });
   read_stimuli(reader, protocol, files);
   rules.read_study(reader, protocol, files, patches);
-  read_apparatus(reader, protocol, rules.check_servo);
+  read_apparatus(reader, protocol);
   read_event_codes(reader, protocol);  // check only; the schedule does not use them
   check_radius(reader, protocol.tool,
                std::any_of(protocol.stimuli.begin(), protocol.stimuli.end(),

@@ -97,12 +97,6 @@ struct PracticeCriterion {
   bool by_round = false;  ///< judged at the end of a round only
 };
 
-/// What determines the order of a block's trials, and how they are announced.
-enum class BlockOrder {
-  own,    ///< the block alone; a question is shown, intervals are told
-  shapes  ///< the study of shapes: schedule.h, through all sessions; nothing but its keys is shown
-};
-
 /// A level of a factor: what it sets.
 struct FactorLevel {
   std::string name;
@@ -152,7 +146,8 @@ struct TaskBlock {
   bool cells_apart = false;         ///< one after the other; else every trial may be of any cell
   std::optional<std::size_t> cell;  ///< of the factors, apart from the other cells
   bool cells_share_tracks = false;  ///< a track goes on over all cells; else each has its own
-  BlockOrder order = BlockOrder::own;
+  /// Intervals are announced, and the question is shown; false: the keys alone, and texts.go.
+  bool announced = true;
   TaskKind task = TaskKind::identify;
   int session = 1;
   bool practice = false;  ///< not analysed
@@ -308,6 +303,10 @@ struct StimulusSpec {
   std::optional<SoundSpec> sound = std::nullopt;  ///< of its contacts; none: they are silent
 };
 
+class OrderRule;
+/// Each block by itself.
+const OrderRule& order_of_blocks();
+
 struct Protocol {
   int version = 1;
   std::string name, title, description;
@@ -357,10 +356,12 @@ struct Protocol {
   double servo_rate = 1000;           ///< Hz
   bool passivity_controller = false;  ///< dissipates the energy that sampling would generate
   MaterialLimit material_limit = MaterialLimit::refuse;
+  bool materials_vary = true;  ///< with levels on record, which a limit would change
   TorqueRule torque = TorqueRule::required;
   struct Home {
-    double rest = 0.5;     ///< s
-    double margin = 0.01;  ///< m outside the bounding spheres
+    double rest = 0.5;       ///< s
+    double margin = 0.01;    ///< m outside the bounding spheres
+    bool beyond_all = true;  ///< of all stimuli, in each trial; false: of the trial's own
   } home;
   struct Texts {
     std::string instructions, practice, break_text, end;
@@ -390,8 +391,9 @@ struct Protocol {
   bool samples = false;
   std::uint64_t seed = 0;
 
-  std::vector<TaskBlock> blocks;            ///< version 1: the study of shapes alone
-  std::vector<std::string> stimulus_texts;  ///< JSON of each stimulus, for its levels
+  std::vector<TaskBlock> blocks;                     ///< version 1: the study of shapes alone
+  const OrderRule* order_rule = &order_of_blocks();  ///< session_plan.h
+  std::vector<std::string> stimulus_texts;           ///< JSON of each stimulus, for its levels
   // Version 2; empty in version 1.
   bool blocks_counterbalanced = false;  ///< within a session; practice stays before its block
   std::vector<PageSpec> pages;

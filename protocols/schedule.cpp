@@ -250,7 +250,7 @@ long long main_trials(const Protocol& protocol) {
 
 TaskBlock shapes_block(const Protocol& protocol) {
   TaskBlock block;
-  block.order = BlockOrder::shapes;
+  block.announced = false;
   block.renderers = protocol.renderers;
   block.repetitions = protocol.repetitions;
   block.practice_feedback = true;
@@ -259,12 +259,6 @@ TaskBlock shapes_block(const Protocol& protocol) {
     block.answers.push_back({"", stimulus.name, ""});
   }
   return block;
-}
-
-std::optional<int> study_of_shapes(const Protocol& protocol) {
-  const auto found = std::ranges::find(protocol.blocks, BlockOrder::shapes, &TaskBlock::order);
-  if (found == protocol.blocks.end()) return std::nullopt;
-  return static_cast<int>(found - protocol.blocks.begin());
 }
 
 std::vector<Trial> practice_round(const Protocol& protocol, int participant_number,

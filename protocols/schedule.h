@@ -62,8 +62,6 @@ inline bool is_seen(const TaskBlock& block, const Interval& interval) {
 /// The study of shapes that a protocol of version 1 describes, as its only block: to identify one
 /// of all stimuli, in their order.
 TaskBlock shapes_block(const Protocol& protocol);
-/// The index of that block; none: the blocks have orders of their own.
-std::optional<int> study_of_shapes(const Protocol& protocol);
 
 /// The limits on the order of trials cannot be satisfied; what() says why and what can be changed.
 class ScheduleError : public std::runtime_error {

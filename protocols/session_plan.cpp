@@ -36,45 +36,103 @@ std::optional<PracticeCriterion> practice_criterion(const Protocol& protocol, in
                            practice.max_rounds * trials, true};
 }
 
+class OrderOfShapes final : public OrderRule {
+ public:
+  SessionSequences sequences(const Protocol& protocol, int participant_number,
+                             int session) const override {
+    SessionSequences out;
+    for (std::vector<Trial>& trials : shapes_of_session(protocol, participant_number, session)) {
+      TrialSequence one;
+      one.expected_trials = [size = static_cast<long long>(trials.size())] { return size; };
+      const bool warm_up = session > 1 && protocol.sessions.warm_up_trials > 0 && out.all.empty();
+      if (trials.front().practice && !warm_up)
+        one.criterion = practice_criterion(protocol, static_cast<int>(trials.size()));
+      if (out.all.empty()) out.first_block = trials.front().block;
+      one.round = [&protocol, participant_number, first = std::move(trials)](std::uint64_t round) {
+        if (round == 0) return first;
+        return practice_round(protocol, participant_number, first.front().renderer,
+                              static_cast<int>(round) + 1);
+      };
+      out.all.push_back(std::move(one));
+    }
+    return out;
+  }
+  const char* conditions_in_words() const override { return "renderers"; }
+  std::vector<std::string> conditions(const Protocol& protocol,
+                                      int participant_number) const override {
+    std::vector<std::string> names;
+    for (const Trial& trial : schedule(protocol, participant_number))
+      names.emplace_back(to_string(trial.renderer));
+    return names;
+  }
+  std::string condition_of(const std::string& renderer, const std::string&) const override {
+    return renderer;
+  }
+};
+
+class OrderOfBlocks final : public OrderRule {
+ public:
+  SessionSequences sequences(const Protocol& protocol, int participant_number,
+                             int session) const override {
+    const auto is_before = [session](const TaskBlock& block) { return block.session < session; };
+    SessionSequences out{1 + static_cast<int>(std::ranges::count_if(protocol.blocks, is_before))};
+    for (const int index : blocks_in_order(protocol, participant_number, session)) {
+      const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
+      const auto round = [&protocol, participant_number, index](std::uint64_t number) {
+        return trials_of_block(protocol, participant_number, index, number);
+      };
+      const auto expected = [&block] { return expected_trials_of(block); };
+      out.all.push_back({index, round, block.criterion, expected, most_trials_of(block)});
+    }
+    return out;
+  }
+  const char* conditions_in_words() const override { return "blocks"; }
+  std::vector<std::string> conditions(const Protocol& protocol,
+                                      int participant_number) const override {
+    std::vector<std::string> names;
+    for (int session = 1; session <= protocol.sessions.count; ++session) {
+      for (const int index : blocks_in_order(protocol, participant_number, session)) {
+        const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
+        if (!block.practice) names.push_back(block.name);
+      }
+    }
+    return names;
+  }
+  std::string condition_of(const std::string&, const std::string& block) const override {
+    return block;
+  }
+};
+
 }  // namespace
 
-SessionPlan::Sequences SessionPlan::sequences_of_shapes(const Protocol& protocol,
-                                                        int participant_number, int session) {
-  Sequences out;
-  for (std::vector<Trial>& trials : shapes_of_session(protocol, participant_number, session)) {
-    Sequence one;
-    one.expected_trials = [size = static_cast<long long>(trials.size())] { return size; };
-    const bool warm_up = session > 1 && protocol.sessions.warm_up_trials > 0 && out.all.empty();
-    if (trials.front().practice && !warm_up)
-      one.criterion = practice_criterion(protocol, static_cast<int>(trials.size()));
-    if (out.all.empty()) out.first_block = trials.front().block;
-    one.round = [&protocol, participant_number, first = std::move(trials)](std::uint64_t round) {
-      if (round == 0) return first;
-      return practice_round(protocol, participant_number, first.front().renderer,
-                            static_cast<int>(round) + 1);
-    };
-    out.all.push_back(std::move(one));
+const OrderRule& order_of_shapes() {
+  static const OrderOfShapes rule;
+  return rule;
+}
+
+const OrderRule& order_of_blocks() {
+  static const OrderOfBlocks rule;
+  return rule;
+}
+
+std::vector<const TaskBlock*> listed_blocks(const Protocol& protocol) {
+  std::vector<const TaskBlock*> out;
+  for (const TaskBlock& block : protocol.blocks) {
+    if (!block.name.empty()) out.push_back(&block);
   }
   return out;
 }
 
-SessionPlan::Sequence SessionPlan::sequence_of_block(const Protocol& protocol,
-                                                     int participant_number, int index) {
-  const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
-  const auto round = [&protocol, participant_number, index](std::uint64_t number) {
-    return trials_of_block(protocol, participant_number, index, number);
-  };
-  const auto expected = [&block] { return expected_trials_of(block); };
-  return {index, round, block.criterion, expected, most_trials_of(block)};
-}
-
-SessionPlan::Sequences SessionPlan::sequences_of(const Protocol& protocol, int participant_number,
-                                                 int session) {
-  if (study_of_shapes(protocol)) return sequences_of_shapes(protocol, participant_number, session);
-  const auto is_before = [session](const TaskBlock& block) { return block.session < session; };
-  Sequences out{1 + static_cast<int>(std::ranges::count_if(protocol.blocks, is_before))};
-  for (const int index : blocks_in_order(protocol, participant_number, session))
-    out.all.push_back(sequence_of_block(protocol, participant_number, index));
+std::vector<TrialCounts> trial_counts(const Protocol& protocol) {
+  std::vector<TrialCounts> out(protocol.blocks.size());
+  for (int session = 1; session <= protocol.sessions.count; ++session) {
+    for (const TrialSequence& one : protocol.order_rule->sequences(protocol, 1, session).all) {
+      TrialCounts& counts = out[static_cast<std::size_t>(one.block)];
+      const long long expected = one.expected_trials();
+      counts.expected += expected;
+      counts.most += one.most_trials.value_or(expected);
+    }
+  }
   return out;
 }
 
@@ -82,7 +140,7 @@ SessionPlan::SessionPlan(const Protocol& protocol, int participant_number, int s
     : protocol_(&protocol_of(protocol, participant_number)),
       participant_number_(participant_number),
       session_(session),
-      sequences_(sequences_of(*protocol_, participant_number, session)) {
+      sequences_(protocol_->order_rule->sequences(*protocol_, participant_number, session)) {
   if (!sequences_.all.empty()) begin_sequence();
   find_next();
 }
@@ -240,7 +298,7 @@ std::size_t SessionPlan::size() const {
   if (finished()) return done_;
   long long left = most_in_sequence() - static_cast<long long>(shown_ - unanswered_);
   for (std::size_t i = at_ + 1; i < sequences_.all.size(); ++i) {
-    const Sequence& later = sequences_.all[i];
+    const TrialSequence& later = sequences_.all[i];
     left += later.most_trials ? *later.most_trials : later.expected_trials();
   }
   return done_ + static_cast<std::size_t>(std::max(1LL, left));

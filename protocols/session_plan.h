@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "protocols/procedures/procedure.h"
@@ -38,6 +39,53 @@ struct TrialChoice {
   /// judged one. Empty: one interval.
   std::vector<Interval> intervals = {};
 };
+
+/// Trials without a break.
+struct TrialSequence {
+  int block = 0;  ///< index into Protocol::blocks
+  /// Its trials in round 0, 1, ...; adaptive: not called.
+  std::function<std::vector<Trial>(std::uint64_t round)> round;
+  std::optional<PracticeCriterion> criterion;
+  std::function<long long()> expected_trials;
+  std::optional<long long> most_trials;  ///< none: those of its rounds
+};
+/// Those of a session.
+struct SessionSequences {
+  int first_block = 1;  ///< number of the first
+  std::vector<TrialSequence> all = {};
+};
+
+/// The order of a study's trials, and what comes in it.
+class OrderRule {
+ public:
+  virtual ~OrderRule() = default;
+  /// \param protocol  must outlive the result
+  virtual SessionSequences sequences(const Protocol& protocol, int participant_number,
+                                     int session) const = 0;
+  /// "renderers" or "blocks": the order of which differs over participants.
+  virtual const char* conditions_in_words() const = 0;
+  /// Their names as they come, each at least once.
+  virtual std::vector<std::string> conditions(const Protocol& protocol,
+                                              int participant_number) const = 0;
+  /// Which of them a trial has.
+  virtual std::string condition_of(const std::string& renderer, const std::string& block) const = 0;
+};
+/// The study of shapes, through all sessions: schedule.h.
+const OrderRule& order_of_shapes();
+inline bool is_study_of_shapes(const Protocol& protocol) {
+  return protocol.order_rule == &order_of_shapes();
+}
+
+/// The blocks that the protocol lists by their names. The study of shapes is none of them.
+std::vector<const TaskBlock*> listed_blocks(const Protocol& protocol);
+
+/// Trials of a block in all sessions, practice and warm-up included.
+struct TrialCounts {
+  long long expected = 0;  ///< if adaptive blocks take their usual course
+  long long most = 0;      ///< in the first round of practice
+};
+/// Of each block of a protocol.
+std::vector<TrialCounts> trial_counts(const Protocol& protocol);
 
 class SessionPlan {
  public:
@@ -81,26 +129,7 @@ class SessionPlan {
   const std::optional<InterleavedTracks>& tracks() const { return tracks_; }
 
  private:
-  /// Trials without a break.
-  struct Sequence {
-    int block = 0;  ///< index into Protocol::blocks
-    /// Its trials in round 0, 1, ...; adaptive: not called.
-    std::function<std::vector<Trial>(std::uint64_t round)> round;
-    std::optional<PracticeCriterion> criterion;
-    std::function<long long()> expected_trials;
-    std::optional<long long> most_trials;  ///< none: those of its rounds
-  };
-  /// Those of a session.
-  struct Sequences {
-    int first_block = 1;  ///< number of the first
-    std::vector<Sequence> all = {};
-  };
-
-  static Sequences sequences_of(const Protocol& protocol, int participant_number, int session);
-  static Sequences sequences_of_shapes(const Protocol& protocol, int participant_number,
-                                       int session);
-  static Sequence sequence_of_block(const Protocol& protocol, int participant_number, int index);
-  const Sequence& sequence() const { return sequences_.all[at_]; }
+  const TrialSequence& sequence() const { return sequences_.all[at_]; }
   std::size_t block_index() const { return static_cast<std::size_t>(sequence().block); }
   void begin_sequence();
   void add_round();
@@ -113,7 +142,7 @@ class SessionPlan {
 
   const Protocol* protocol_;
   int participant_number_, session_;
-  Sequences sequences_;
+  SessionSequences sequences_;
   std::size_t at_ = 0;                ///< into sequences_.all
   std::size_t done_ = 0, shown_ = 0;  ///< in the session, in the sequence
   std::size_t unanswered_ = 0;        ///< in an adaptive block

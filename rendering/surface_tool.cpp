@@ -34,7 +34,7 @@ constexpr double kSameFace = 1 - 5e-9;  // cosine of 1e-4 rad, by which rounding
 constexpr double kOnSide = 2;           // skins; from one to the exact place on the same side
 constexpr int kMostInTheWay = 4;
 constexpr int kPieces = 64;  // the first piece of a long cast, at least
-// A list of patches along a way. Where it is used up it is made anew:
+// A list of patches along a way. A list that is used up is made again:
 constexpr double kFirstWay = 0.01;  // of the size; the longest way of a tool that has not moved
 constexpr double kTwice = 2;        // of the stride; else the longest way
 constexpr double kSlower = 0.75;    // of the stride; it shrinks to that in a tick
@@ -148,7 +148,7 @@ double SurfaceTool::room_on_triangles(double aside) const {
   return std::max(aside, std::min(kMore * aside, kFew * side));
 }
 
-/// Lists the patches near the turned tool on a way, with as much room as a short list allows.
+/// Lists the patches near the turned tool on a way, with the widest margin that keeps it short.
 void SurfaceTool::list_about(const Vec3& at, const Vec3& way, double aside) {
   const double size = surface_.size(), least = kLeastRoom * skin_;
   own_.listed = turned_;
@@ -191,7 +191,7 @@ bool SurfaceTool::in_room(const Vec3& at, double share) const {
   return in_list_ && off_way2(at) < share * share * own_.room * own_.room;
 }
 
-/// Looks whether there is a list for this orientation.
+/// Checks for a list of this orientation.
 void SurfaceTool::find_list() {
   in_list_ = own_.has_list && same_turn();
   if (!in_list_) return;

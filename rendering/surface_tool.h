@@ -18,7 +18,7 @@ struct SurfacePlane {
   Vec3 normal;            ///< out of the solid
   double depth = 0;       ///< m, of the virtual tool below it: dot(normal, y) >= depth outside
   double multiplier = 0;  ///< m, of the normal in the way from the virtual to the ideal tool
-  bool stays = false;     ///< released and hit again at one place: rounding, keep it there
+  bool stays = false;     ///< a release and hit in place is rounding: keep the patch
   bool step = false;      ///< the side of a step of rounding, for this tick alone
 };
 

@@ -309,8 +309,8 @@ bool IdealTool::slid_off_at_rest(const Plane& plane, double slack) const {
 }
 
 /// Replaces the plane by that of the next facet of M if the tool, a skin away, is over that facet.
-/// The way to the place where the new plane holds the tool is then free: it does not cross the
-/// plane.
+/// Moving to the place where the new plane holds the tool crosses nothing: the way stays outside
+/// of that plane.
 bool IdealTool::slide_on(Plane& plane) {
   const NearPair& near = pairs_[plane.near];
   const ContactFeature next =
@@ -324,14 +324,14 @@ bool IdealTool::slide_on(Plane& plane) {
   return true;
 }
 
-/// Whether the pair let go of the ideal tool at its present place, within rounding.
+/// Whether the pair released the ideal tool at its present place, within rounding.
 bool IdealTool::parted_here(const NearPair& near) const {
   const double same = kSamePlace * group_.skin;
   const Vec3 apart = at_ - near.parted_at;
   return near.parted && glm::dot(apart, apart) <= same * same;
 }
 
-/// Lets go of planes that hold nothing.
+/// Releases planes that hold nothing.
 void IdealTool::release_idle_planes() {
   planes_.remove_if([&](const Plane& plane) {
     if (plane.multiplier > 0) return false;
@@ -340,7 +340,7 @@ void IdealTool::release_idle_planes() {
   });
 }
 
-/// Lets go of planes whose facet the tool has slid off. True if there are any.
+/// Releases planes whose facet the tool has slid off. True if there are any.
 bool IdealTool::release_slid_planes(bool at_rest) {
   bool slid = false;
   planes_.remove_if([&](Plane& plane) {

@@ -60,11 +60,12 @@ MAY_INCLUDE = {
     "runner/design": SERVO | {"protocols", "data", "data/files", "data/store", "analysis", "analysis/input", "analysis/report",
                               "analysis/statistics", "runner/participants", "runner/serve", "runner/session", "runner/station",
                               "runner/study", "runner/touch"},
-    "runner/sweep": SERVO | {"protocols", "data", "data/files", "data/store", "runner/output", "runner/participants", "runner/session"},
+    "runner/sweep": SERVO | {"protocols", "data", "data/files", "data/store", "analysis/input", "analysis/statistics", "runner/output",
+                            "runner/participants", "runner/session"},
     "runner/output": {"stimuli", "data", "data/files", "runner"},
     # Who takes part, with what.
     "runner/station": SERVO | {"protocols", "data", "data/files", "data/store", "runner/safety", "runner/devices", "runner/display",
-                               "runner/participants", "runner/session", "runner/sound"},
+                               "runner/participants", "runner/session", "runner/sound", "runner/study"},
     "runner/touch": SERVO | {"protocols", "data", "data/files", "data/store", "analysis", "analysis/figures", "analysis/input",
                              "analysis/report", "runner/safety", "runner/output", "runner/session", "runner/display",
                              "runner/display/scene", "runner/serve", "runner/station"},
@@ -114,7 +115,7 @@ PUBLIC = {
     "rendering": "field_demand fields first_contact probe reach render_fault renderer scene tool",
     "rendering/bodies": "moving_scene",
     "runner/evidence/verification": "explain extreme_cases random_solids reference search surface_reference union_cases",
-    "runner/evidence/scenes": "feature_costs scene_study",
+    "runner/evidence/scenes": "feature_costs scene_study stage_costs tick_costs",
     "runner/evidence/accuracy": "body_study methods paper_first_contact peers study union_study",
     "rendering/bodies/soft": "soft_scene",
     "protocols": "answer_keys difference factors groups json_document parse protocol schedule session_plan sight sound sweep_space "
@@ -145,13 +146,13 @@ PUBLIC = {
     "runner/display": "display explore_window mailbox seen text_display timeline window",
     "runner/display/scene": "camera gl_objects picture drawn_mesh image_file painter scene_drawing "
                             "scene_renderer",
-    "runner/participants": "keyboard reacher respondent seen_record seen_trial simulated_settings simulated "
+    "runner/participants": "keyboard reacher respondent response_box seen_record seen_trial simulated_settings simulated "
                            "task_participant",
     "runner/session": "device_check effect_check live_forces live_session markers recorded_outcome sample_stream session_scenes signals "
                       "preflight run_record replay session session_end simulated_study "
                       "socket_advisor station",
     "runner/output": "outputs progress_line",
-    "runner/station": "admission lag_check opening protocol_check protocol_choice run_settings sound_timing",
+    "runner/station": "admission lag_check opening protocol_check protocol_choice run_settings servo_timing sound_timing",
     "runner/touch": "checked_meshes forces live_touch scene_notes trial_page",
     "runner/movement": "movement_study touched_trial",
     "runner/evidence/reports": "accuracy_report boundary_report scene_report stability_report stability_study",
@@ -159,9 +160,9 @@ PUBLIC = {
     "runner/study": "cue_study export_settings schedule_text simulation_limits study_order study_trials task_words",
     "runner/serve": "loopback network page_server served_scene served_session",
     "runner/design": "design_page protocol_file rehearsal",
-    "runner/sweep": "cluster_folder cluster_job design slurm swept_study",
+    "runner/sweep": "cluster_folder cluster_job planned_sweep slurm",
     "runner/evidence/stability": "boundary effect_stability scene_boundary",
-    "runner/evidence": "tick_meters",
+    "runner/evidence": "",
     "runner/commands": "shared/command",
 }
 

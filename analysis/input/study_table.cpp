@@ -727,10 +727,10 @@ StudyTable read_study_csv(const std::string& path, const std::vector<std::string
 }
 
 StudyTable read_study_store(data::Store& store, const std::string& protocol) {
-  std::vector<data::ProtocolInfo> wanted = store.protocols();
-  std::erase_if(wanted, [&](const data::ProtocolInfo& one) {
-    return !is_protocol(protocol, one.name, one.sha256);
-  });
+  std::vector<std::string> wanted;
+  for (const data::ProtocolInfo& one : store.protocols()) {
+    if (is_protocol(protocol, one.name, one.sha256)) wanted.push_back(one.text);
+  }
   if (!data::have_blocks(wanted))
     return of_shapes(read_trials_store(store, protocol), store.path(), {});
   return read_tasks_store(store, protocol);

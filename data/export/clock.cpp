@@ -52,6 +52,12 @@ std::vector<std::string> dimensions_of(const std::vector<ProtocolInfo>& protocol
   return out;
 }
 
+std::vector<std::string> texts_of(const std::vector<ProtocolInfo>& protocols) {
+  std::vector<std::string> out;
+  for (const ProtocolInfo& protocol : protocols) out.push_back(protocol.text);
+  return out;
+}
+
 bool have_reaches(const std::vector<ProtocolInfo>& protocols) {
   const auto reaches = [](const StoredBlock& block) { return block.task == "reach"; };
   return std::ranges::any_of(protocols, [&](const ProtocolInfo& protocol) {
@@ -70,7 +76,7 @@ bool have(const std::vector<ProtocolInfo>& protocols, bool StoredProtocol::*what
 
 ExportClock::ExportClock(const std::vector<ProtocolInfo>& protocols, Times times)
     : times_(times),
-      tasks_(have_blocks(protocols)),
+      tasks_(have_blocks(texts_of(protocols))),
       reaches_(have_reaches(protocols)),
       seen_(have(protocols, &StoredProtocol::has_view)),
       heard_(have(protocols, &StoredProtocol::has_sound)),

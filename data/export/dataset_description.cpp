@@ -160,10 +160,8 @@ std::string dataset_name(const std::map<std::string, StudyLabel>& labels, bool s
 }
 
 std::string dataset_description(const std::map<std::string, StudyLabel>& labels, bool simulated) {
-  const bool tasks = std::any_of(labels.begin(), labels.end(), [](const auto& entry) {
-    return !entry.second.facts.blocks.empty();
-  });
-  std::string text = tasks ? "Judgements of objects" : "Identification of shapes";
+  std::string text =
+      all_facts(labels).blocks.empty() ? "Identification of shapes" : "Judgements of objects";
   text += " by touch through a force-feedback stylus, one row a trial, recorded by palpate.";
   for (const auto& [sha256, study] : labels) {
     if (!study.facts.title.empty())

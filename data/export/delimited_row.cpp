@@ -1,6 +1,7 @@
 #include "data/export/delimited_row.h"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <compare>
 #include <map>
@@ -122,8 +123,16 @@ std::vector<std::string> names() {
   return out;
 }
 
+/// A column's texts, which live as long as the program.
+const char* kept(const std::string& text) {
+  static std::set<std::string> texts;
+  static std::mutex mutex;
+  const std::lock_guard lock(mutex);
+  return texts.insert(text).first->c_str();
+}
+
 /// Adds the columns of trials of protocol version 2.
-std::vector<Column> with_tasks(std::vector<Column> columns) {
+void describe_tasks(std::vector<Column>& columns, const ExportClock& clock) {
   for (Column& column : columns) {
     const std::string_view name = column.name;
     if (name == "shape") {
@@ -179,11 +188,15 @@ std::vector<Column> with_tasks(std::vector<Column> columns) {
       {"interval_levels", "Level of each interval felt; empty: the stimulus unchanged, or nothing"},
   };
   columns.insert(columns.end(), more.begin(), more.end());
-  return columns;
+  for (const std::string& name : clock.dimensions())
+    columns.push_back({kept(name),
+                       "Dimension of the varied level; missing in catch trials and if the block "
+                       "does not vary it",
+                       Column::kLevelUnit});
 }
 
 /// Adds the columns of movements to targets, and what the others mean of them.
-std::vector<Column> with_reaches(std::vector<Column> columns) {
+void describe_reaches(std::vector<Column>& columns, const ExportClock&) {
   for (Column& column : columns) {
     const std::string_view name = column.name;
     if (name == "task") {
@@ -226,10 +239,9 @@ std::vector<Column> with_reaches(std::vector<Column> columns) {
        "1"},
   };
   columns.insert(columns.end(), more.begin(), more.end());
-  return columns;
 }
 
-std::vector<Column> with_sight(std::vector<Column> columns) {
+void describe_sight(std::vector<Column>& columns, const ExportClock&) {
   const std::vector<Column> more = {
       {"seen_lag_ms",
        "From the tick whose pose was drawn to the swap of its frame, by the program's clock, "
@@ -239,27 +251,24 @@ std::vector<Column> with_sight(std::vector<Column> columns) {
       {"frames_dropped", "Frames missing between those drawn, by their median distance", "1"},
   };
   columns.insert(columns.end(), more.begin(), more.end());
-  return columns;
 }
 
-std::vector<Column> with_sound(std::vector<Column> columns) {
+void describe_sound(std::vector<Column>& columns, const ExportClock&) {
   columns.push_back(
       {"sound_lag_ms",
        "From the tick of a contact to its sound, by the program's clock, beyond the intended delay "
        "and without what the sound card adds: median of the trial's knocks; missing: there was "
        "none",
        "ms"});
-  return columns;
 }
 
-std::vector<Column> with_torque(std::vector<Column> columns) {
+void describe_torque(std::vector<Column>& columns, const ExportClock&) {
   columns.push_back(
       {"torque_driven",
        "Whether the device drove the torque of the renderer; missing: the renderer gives no torque",
        "",
        {{"0", "the device drives force alone: the force was felt at the grip, without torque"},
         {"1", "driven, as the renderer gave it"}}});
-  return columns;
 }
 
 /// After the participant.
@@ -377,14 +386,6 @@ std::vector<Column> made_relative(std::vector<Column> columns) {
   return columns;
 }
 
-/// A column's texts, which live as long as the program.
-const char* kept(const std::string& text) {
-  static std::set<std::string> texts;
-  static std::mutex mutex;
-  const std::lock_guard lock(mutex);
-  return texts.insert(text).first->c_str();
-}
-
 Column column_of(const StoredFactor& factor) {
   Column out{kept(factor.name), "Level of a factor; missing: the trial's block does not cross it"};
   for (const auto& [level, sets] : factor.levels)
@@ -403,118 +404,26 @@ std::vector<Column> with_factors(std::vector<Column> columns,
   return columns;
 }
 
-std::vector<Column> with_dimensions(std::vector<Column> columns,
-                                    const std::vector<std::string>& names) {
-  const auto last = std::ranges::find_if(
-      columns, [](const Column& one) { return std::string_view(one.name) == "interval_levels"; });
-  std::vector<Column> more;
-  more.reserve(names.size());
-  for (const std::string& name : names)
-    more.push_back({kept(name),
-                    "Dimension of the varied level; missing in catch trials and if the block does "
-                    "not vary it",
-                    Column::kLevelUnit});
-  columns.insert(last + 1, more.begin(), more.end());
-  return columns;
-}
+/// The columns from `task` on.
+struct TaskValues {
+  explicit TaskValues(const TrialRecord& record);
+  std::string task, block_name;
+  std::optional<int> track;
+  std::optional<double> level, standard_level;
+  std::optional<bool> catch_trial, success;
+  std::optional<double> number, confidence, confidence_delay;  // s
+  std::optional<int> comparison_interval;
+  std::string onsets, ends, levels;
+  std::vector<std::pair<std::string, double>> dimensions;
 
-/// Which columns a table has.
-struct ColumnSets {
-  bool cut_off = false;  ///< of attempts that were cut off
-  bool tasks = false, reaches = false, seen = false, heard = false, torque = false,
-       relative = false, groups = false;
-  std::vector<std::pair<std::string, std::string>> levels = {};  ///< of factors
-  std::vector<std::string> dimensions = {};
-  auto operator<=>(const ColumnSets&) const = default;
+  /// Missing: the trial's block has no such dimension, or it is a catch trial.
+  std::optional<double> dimension(const std::string& name) const;
 };
-
-/// \param cut_off  of attempts that were cut off
-std::span<const Column> columns_for(const ExportClock& clock, bool cut_off) {
-  ColumnSets sets{.cut_off = cut_off,
-                  .tasks = !cut_off && clock.tasks(),
-                  .reaches = !cut_off && clock.reaches(),
-                  .seen = !cut_off && clock.seen(),
-                  .heard = !cut_off && clock.heard(),
-                  .torque = !cut_off && clock.torque().any(),
-                  .relative = clock.relative(),
-                  .groups = clock.groups().any()};
-  for (const StoredFactor& factor : clock.factors()) {
-    sets.levels.emplace_back(factor.name, "");
-    sets.levels.insert(sets.levels.end(), factor.levels.begin(), factor.levels.end());
-  }
-  if (!cut_off) sets.dimensions = clock.dimensions();
-  static std::map<ColumnSets, std::vector<Column>> tables;
-  static std::mutex mutex;
-  const std::lock_guard lock(mutex);
-  const auto [table, is_new] = tables.try_emplace(sets);
-  std::vector<Column>& columns = table->second;
-  if (!is_new) return columns;
-  columns = cut_off ? make_attempts() : make_trials();
-  if (sets.tasks) columns = with_tasks(std::move(columns));
-  if (!sets.dimensions.empty()) columns = with_dimensions(std::move(columns), sets.dimensions);
-  if (sets.reaches) columns = with_reaches(std::move(columns));
-  if (sets.seen) columns = with_sight(std::move(columns));
-  if (sets.heard) columns = with_sound(std::move(columns));
-  if (sets.torque) columns = with_torque(std::move(columns));
-  if (sets.relative) columns = made_relative(std::move(columns));
-  if (sets.groups) columns = with_group(std::move(columns));
-  if (!clock.factors().empty()) columns = with_factors(std::move(columns), clock.factors());
-  return columns;
-}
 
 void add_to_list(std::string& list, std::optional<double> value, bool first) {
   if (!first) list += ';';
   char text[32];
   if (value) list.append(text, std::to_chars(text, text + sizeof text, *value).ptr);
-}
-
-bool quotes_needed(std::string_view text) {
-  // Without early exit, so that compilers vectorise the loop.
-  bool needed = false;
-  for (const char c : text) needed |= c == ',' || c == '"' || c == '\r' || c == '\n';
-  return needed;
-}
-
-bool fits_tsv(std::string_view text) {
-  return text != "n/a" && std::none_of(text.begin(), text.end(),
-                                       [](char c) { return c == '\t' || c == '\r' || c == '\n'; });
-}
-
-}  // namespace
-
-std::span<const Column> trial_columns(const ExportClock& clock) {
-  return columns_for(clock, false);
-}
-
-std::span<const Column> columns_of_trial(const ExportClock& clock) {
-  return trial_columns(clock).subspan(clock.groups().any() ? 2 : 1);
-}
-
-std::span<const Column> attempt_columns(const ExportClock& clock) {
-  return columns_for(clock, true);
-}
-
-const Column& group_column() { return kGroup; }
-
-const Column& interval_column() {
-  static const Column interval{"interval",
-                               "Interval of the trial, from 1, to which the tick belongs", "1"};
-  return interval;
-}
-
-std::span<const Column> sample_columns() {
-  static const std::vector<Column> all = make_samples();
-  return all;
-}
-
-std::span<const Column> contact_columns() {
-  static const std::vector<Column> all = make_contacts();
-  return all;
-}
-
-std::span<const Column> body_columns() {
-  static const std::vector<Column> all = make_bodies();
-  return all;
 }
 
 TaskValues::TaskValues(const TrialRecord& record) {
@@ -548,6 +457,150 @@ std::optional<double> TaskValues::dimension(const std::string& name) const {
   return found->second;
 }
 
+void put_task(DelimitedRow& row, const StoredTrial& trial, const ExportClock& clock) {
+  const TaskValues task(trial.record);
+  row << task.task << task.block_name << task.track << task.level << task.standard_level
+      << task.catch_trial << task.success << task.number << task.confidence << task.confidence_delay
+      << task.comparison_interval << task.onsets << task.ends << task.levels;
+  for (const std::string& name : clock.dimensions()) row << task.dimension(name);
+}
+
+void put_reach(DelimitedRow& row, const StoredTrial& trial, const ExportClock&) {
+  const ReachRecord reach = trial.record.task.reach.value_or(ReachRecord());
+  row << reach.kind << reach.duration << reach.peak_speed << reach.deviation
+      << reach.largest_deviation << reach.path_ratio << reach.endpoint_error << reach.side_force
+      << reach.adaptation;
+}
+
+void put_sight(DelimitedRow& row, const StoredTrial& trial, const ExportClock&) {
+  const auto& seen = trial.record.task.seen;
+  const auto milliseconds = [&](double SeenRecord::*value) {
+    return seen ? std::optional(1000 * (*seen).*value) : std::nullopt;
+  };
+  row << milliseconds(&SeenRecord::lag) << milliseconds(&SeenRecord::lag_p99)
+      << (seen ? std::optional(seen->dropped) : std::nullopt);
+}
+
+void put_sound(DelimitedRow& row, const StoredTrial& trial, const ExportClock&) {
+  const auto& heard = trial.record.task.heard;
+  row << (heard ? std::optional(1000 * heard->lag) : std::nullopt);
+}
+
+void put_torque(DelimitedRow& row, const StoredTrial& trial, const ExportClock& clock) {
+  row << clock.torque().driven(trial);
+}
+
+/// Columns of trials that only some protocols need, in their order.
+struct TrialPart {
+  bool (*has)(const ExportClock&);
+  void (*describe)(std::vector<Column>&, const ExportClock&);
+  void (*put)(DelimitedRow&, const StoredTrial&, const ExportClock&);
+};
+constexpr std::array<TrialPart, 5> kParts{
+    {{[](const ExportClock& clock) { return clock.tasks(); }, describe_tasks, put_task},
+     {[](const ExportClock& clock) { return clock.reaches(); }, describe_reaches, put_reach},
+     {[](const ExportClock& clock) { return clock.seen(); }, describe_sight, put_sight},
+     {[](const ExportClock& clock) { return clock.heard(); }, describe_sound, put_sound},
+     {[](const ExportClock& clock) { return clock.torque().any(); }, describe_torque, put_torque}}};
+
+/// Which columns a table has.
+struct ColumnSets {
+  bool cut_off = false;  ///< of attempts that were cut off
+  std::array<bool, kParts.size()> parts{};
+  bool relative = false, groups = false;
+  std::vector<std::pair<std::string, std::string>> levels = {};  ///< of factors
+  std::vector<std::string> dimensions = {};
+  auto operator<=>(const ColumnSets&) const = default;
+};
+
+/// \param cut_off  of attempts that were cut off
+std::span<const Column> columns_for(const ExportClock& clock, bool cut_off) {
+  ColumnSets sets{.cut_off = cut_off, .relative = clock.relative(), .groups = clock.groups().any()};
+  for (std::size_t i = 0; i < kParts.size(); ++i) sets.parts[i] = !cut_off && kParts[i].has(clock);
+  for (const StoredFactor& factor : clock.factors()) {
+    sets.levels.emplace_back(factor.name, "");
+    sets.levels.insert(sets.levels.end(), factor.levels.begin(), factor.levels.end());
+  }
+  if (!cut_off) sets.dimensions = clock.dimensions();
+  static std::map<ColumnSets, std::vector<Column>> tables;
+  static std::mutex mutex;
+  const std::lock_guard lock(mutex);
+  const auto [table, is_new] = tables.try_emplace(sets);
+  std::vector<Column>& columns = table->second;
+  if (!is_new) return columns;
+  columns = cut_off ? make_attempts() : make_trials();
+  for (std::size_t i = 0; i < kParts.size(); ++i) {
+    if (sets.parts[i]) kParts[i].describe(columns, clock);
+  }
+  if (sets.relative) columns = made_relative(std::move(columns));
+  if (sets.groups) columns = with_group(std::move(columns));
+  if (!clock.factors().empty()) columns = with_factors(std::move(columns), clock.factors());
+  return columns;
+}
+
+bool quotes_needed(std::string_view text) {
+  // Without early exit, so that compilers vectorise the loop.
+  bool needed = false;
+  for (const char c : text) needed |= c == ',' || c == '"' || c == '\r' || c == '\n';
+  return needed;
+}
+
+bool fits_tsv(std::string_view text) {
+  return text != "n/a" && std::none_of(text.begin(), text.end(),
+                                       [](char c) { return c == '\t' || c == '\r' || c == '\n'; });
+}
+
+}  // namespace
+
+std::span<const Column> trial_columns(const ExportClock& clock) {
+  return columns_for(clock, false);
+}
+
+std::span<const Column> columns_of_trial(const ExportClock& clock) {
+  return trial_columns(clock).subspan(clock.groups().any() ? 2 : 1);
+}
+
+std::span<const Column> attempt_columns(const ExportClock& clock) {
+  return columns_for(clock, true);
+}
+
+const Column& group_column() { return kGroup; }
+
+std::span<const Column> interval_columns(const ProtocolFacts& facts) {
+  static const Column interval{"interval",
+                               "Interval of the trial, from 1, to which the tick belongs", "1"};
+  return {&interval, facts.blocks.empty() ? std::size_t{0} : 1};
+}
+
+std::span<const Column> sample_columns() {
+  static const std::vector<Column> all = make_samples();
+  return all;
+}
+
+std::span<const Column> contact_columns() {
+  static const std::vector<Column> all = make_contacts();
+  return all;
+}
+
+std::span<const Column> body_columns() {
+  static const std::vector<Column> all = make_bodies();
+  return all;
+}
+
+void put_columns_of_trial(DelimitedRow& row, const StoredTrial& trial, const ExportClock& clock) {
+  put_plain_columns(row, trial, clock);
+  for (const TrialPart& part : kParts) {
+    if (part.has(clock)) part.put(row, trial, clock);
+  }
+  if (clock.relative()) row << clock.elapsed(trial);
+}
+
+void put_trial(DelimitedRow& row, const StoredTrial& trial, const ExportClock& clock) {
+  row << trial.participant.code;
+  if (clock.groups().any()) row << clock.groups().of(trial.participant, trial.protocol_sha256);
+  put_columns_of_trial(row, trial, clock);
+}
+
 void put_attempt(DelimitedRow& row, const StoredTrial& attempt, const ExportClock& clock) {
   const TrialRecord& record = attempt.record;
   row << attempt.participant.code;
@@ -561,6 +614,10 @@ void put_attempt(DelimitedRow& row, const StoredTrial& attempt, const ExportCloc
       << attempt.participant.simulated << attempt.protocol_sha256 << attempt.run.program_version
       << attempt.participant.enrolled_number;
   if (clock.relative()) row << clock.elapsed(attempt);
+}
+
+void put_interval(DelimitedRow& row, std::span<const Column> columns, int interval) {
+  for (std::size_t i = 0; i < columns.size(); ++i) row << interval;
 }
 
 void put_sample(DelimitedRow& row, const SampleRecord& sample) {
@@ -709,7 +766,8 @@ std::int64_t write_pages(Store& store, TextSink& out, const ExportClock& clock,
 TrialTable::TrialTable() : table_(names()) {}
 
 void TrialTable::add(const StoredTrial& trial) {
-  put_trial(table_, trial, ExportClock());
+  table_ << trial.participant.code;
+  put_plain_columns(table_, trial, ExportClock());
   table_.end_row();
 }
 

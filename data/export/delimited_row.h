@@ -51,8 +51,8 @@ std::span<const Column> sample_columns();  ///< of a servo tick, in order
 std::span<const Column> body_columns();
 /// After those, if contacts are requested.
 std::span<const Column> contact_columns();
-/// Before them, if the database has a protocol of version 2.
-const Column& interval_column();
+/// Before them: the interval of a trial, if its protocols have blocks; else none.
+std::span<const Column> interval_columns(const ProtocolFacts& facts);
 
 enum class DelimitedFormat {
   csv,  ///< RFC 4180: fields quoted where needed, CRLF; a missing value is an empty field
@@ -98,22 +98,6 @@ class DelimitedRow {
 // Internal to data/export: the values of the columns that delimited_row.h defines, in the same
 // order.
 
-/// The columns from `task` on.
-struct TaskValues {
-  explicit TaskValues(const TrialRecord& record);
-  std::string task, block_name;
-  std::optional<int> track;
-  std::optional<double> level, standard_level;
-  std::optional<bool> catch_trial, success;
-  std::optional<double> number, confidence, confidence_delay;  // s
-  std::optional<int> comparison_interval;
-  std::string onsets, ends, levels;
-  std::vector<std::pair<std::string, double>> dimensions;
-
-  /// Missing: the trial's block has no such dimension, or it is a catch trial.
-  std::optional<double> dimension(const std::string& name) const;
-};
-
 /// Missing where no answer is right or wrong.
 inline std::optional<bool> correct_of(const TrialRecord& record) {
   if (!has_right_answer(record)) return std::nullopt;
@@ -128,9 +112,9 @@ void put_factors(Row& row, const TrialRecord& record, const ExportClock& clock) 
   for (const StoredFactor& factor : clock.factors()) row << name.level(factor.name);
 }
 
-/// columns_of_trial(). \param row  a DelimitedRow or a ColumnTable
+/// The columns of every trial, after the participant. \param row  a DelimitedRow or a ColumnTable
 template <class Row>
-void put_columns_of_trial(Row& row, const StoredTrial& trial, const ExportClock& clock) {
+void put_plain_columns(Row& row, const StoredTrial& trial, const ExportClock& clock) {
   const TrialRecord& record = trial.record;
   row << record.session << record.block << record.trial << record.renderer
       << base_name(record.shape) << record.response << correct_of(record) << record.response_time;
@@ -147,42 +131,11 @@ void put_columns_of_trial(Row& row, const StoredTrial& trial, const ExportClock&
   for_each_measured(record, [&](const MeasuredColumn& column, const auto& value) {
     if (*column.description) row << value;
   });
-  if (clock.tasks()) {
-    const TaskValues task(record);
-    row << task.task << task.block_name << task.track << task.level << task.standard_level
-        << task.catch_trial << task.success << task.number << task.confidence
-        << task.confidence_delay << task.comparison_interval << task.onsets << task.ends
-        << task.levels;
-    for (const std::string& name : clock.dimensions()) row << task.dimension(name);
-  }
-  if (clock.reaches()) {
-    const ReachRecord reach = record.task.reach.value_or(ReachRecord());
-    row << reach.kind << reach.duration << reach.peak_speed << reach.deviation
-        << reach.largest_deviation << reach.path_ratio << reach.endpoint_error << reach.side_force
-        << reach.adaptation;
-  }
-  if (clock.seen()) {
-    const auto& seen = record.task.seen;
-    const auto milliseconds = [&](double SeenRecord::*value) {
-      return seen ? std::optional(1000 * (*seen).*value) : std::nullopt;
-    };
-    row << milliseconds(&SeenRecord::lag) << milliseconds(&SeenRecord::lag_p99)
-        << (seen ? std::optional(seen->dropped) : std::nullopt);
-  }
-  if (clock.heard()) {
-    const auto& heard = record.task.heard;
-    row << (heard ? std::optional(1000 * heard->lag) : std::nullopt);
-  }
-  if (clock.torque().any()) row << clock.torque().driven(trial);
-  if (clock.relative()) row << clock.elapsed(trial);
 }
+/// columns_of_trial()
+void put_columns_of_trial(DelimitedRow& row, const StoredTrial& trial, const ExportClock& clock);
 /// trial_columns()
-template <class Row>
-void put_trial(Row& row, const StoredTrial& trial, const ExportClock& clock) {
-  row << trial.participant.code;
-  if (clock.groups().any()) row << clock.groups().of(trial.participant, trial.protocol_sha256);
-  put_columns_of_trial(row, trial, clock);
-}
+void put_trial(DelimitedRow& row, const StoredTrial& trial, const ExportClock& clock);
 /// attempt_columns()
 void put_attempt(DelimitedRow& row, const StoredTrial& attempt, const ExportClock& clock);
 /// sample_columns(): positions rounded to 1 nm, forces to 1 uN and torques to 1 uN m, a thousandth
@@ -190,6 +143,8 @@ void put_attempt(DelimitedRow& row, const StoredTrial& attempt, const ExportCloc
 void put_sample(DelimitedRow& row, const SampleRecord& sample);
 /// contact_columns(), positions rounded to 1 nm; missing in free space.
 void put_contact(DelimitedRow& row, const std::optional<TickContact>& contact);
+/// \param columns  as interval_columns()
+void put_interval(DelimitedRow& row, std::span<const Column> columns, int interval);
 /// Whether a stimulus of the protocol moves: samples then have body_columns() as well.
 bool has_bodies(const ProtocolFacts& facts);
 /// body_columns(), rounded to 1e-9 of their unit; missing if the stimulus is at rest.

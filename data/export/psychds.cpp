@@ -98,6 +98,7 @@ class PsychDsWriter : public DatasetWriter {
   void write_samples(const StoredTrial& trial, const std::string& stem, const ProtocolFacts& facts);
   Json variables() const;
 
+  const std::span<const Column> intervals_ = interval_columns(all_facts(labels_));
   std::set<std::string> used_;  // columns
   std::int64_t participant_ = -1;
   int session_ = 0;  // of haptic_
@@ -153,12 +154,11 @@ void PsychDsWriter::write_samples(const StoredTrial& trial, const std::string& s
     row_ << "participant_id"
          << "session"
          << "trial";
-    if (clock_.tasks()) row_ << interval_column().name;
-    row_ << kTimeOfTick.name << sample_columns();
+    row_ << intervals_ << kTimeOfTick.name << sample_columns();
     if (bodies) row_ << body_columns();
     if (settings_.contacts) row_ << contact_columns();
     haptic_->write(row_.end());
-    if (clock_.tasks()) use({&interval_column(), 1});
+    use(intervals_);
     use({&kTimeOfTick, 1});
     use(sample_columns());
     if (bodies) use(body_columns());
@@ -172,7 +172,7 @@ void PsychDsWriter::write_samples(const StoredTrial& trial, const std::string& s
   for (const SampleRecord& sample : record.samples) {
     const std::int64_t slot = slots.next();
     row_ << trial.participant.code << record.session << record.trial;
-    if (clock_.tasks()) row_ << slots.interval();
+    put_interval(row_, intervals_, slots.interval());
     row_ << static_cast<double>(slot) / facts.servo_rate;
     put_sample(row_, sample);
     if (bodies) put_body(row_, record, sample);
@@ -194,7 +194,7 @@ Json PsychDsWriter::variables() const {
   };
   add(trial_columns(clock_));
   add(attempt_columns(clock_));
-  add({&interval_column(), 1});
+  add(intervals_);
   add({&kTimeOfTick, 1});
   add(sample_columns());
   add(body_columns());

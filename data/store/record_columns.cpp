@@ -235,7 +235,7 @@ void read_outcome(RowReader& row, TrialRecord& record) {
   for (double& x : record.start_tip) row >> x;
   for (double& x : record.start_tail) row >> x;
   for_each_measured(record, [&](const MeasuredColumn&, auto& value) { row >> value; });
-  if (!record.task.of_block()) record.task.success = record.correct;
+  if (record.task.task == TaskRecord().task) record.task.success = record.correct;
 }
 
 bool is_clean_utf8(std::string_view text) {

@@ -203,71 +203,100 @@ Protocol shapes_view(const Protocol& protocol, const TaskBlock* block) {
   return view;
 }
 
-/// Whether orientations are drawn with the order, for all such blocks of a participant together.
-bool has_order_of_shapes(const TaskBlock& block) {
-  if (block.order == BlockOrder::shapes) return true;
-  return block.task == TaskKind::identify && block.procedures.empty() && block.factors.empty() &&
-         (block.renderers.size() == 1 || (!block.max_run && !block.min_distance));
-}
+/// How the trials of a block without adaptive levels are drawn.
+class BlockRule {
+ public:
+  virtual ~BlockRule() = default;
+  /// Without orientations.
+  virtual std::vector<Trial> trials(const Protocol& protocol, int participant, int index,
+                                    std::uint64_t round) const = 0;
+  virtual void orient(const Protocol& protocol, int participant, int index, std::uint64_t round,
+                      std::vector<Trial>& trials) const = 0;
+};
 
-std::vector<Trial> shapes_trials(const Protocol& protocol, int participant, int index, int round) {
-  const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
-  const Protocol view = shapes_view(protocol, &block);
-  const auto before = std::count_if(
-      protocol.blocks.begin(), protocol.blocks.begin() + index, [&](const TaskBlock& other) {
-        return has_order_of_shapes(other) && other.practice == block.practice &&
-               other.renderers == block.renderers;
-      });
-  const int number = static_cast<int>(before);
-  std::vector<Trial> trials =
-      block.practice
-          ? practice_round(view, participant, block.renderers.front(), number + 1 + round)
-          : block_of_trials(view, participant, block.renderers, number, block.repetitions);
-  const std::vector<BlockTrack> tracks = tracks_of(block);
-  for (Trial& trial : trials) {
-    trial.stimulus = block.stimuli[static_cast<std::size_t>(trial.stimulus)];
-    const auto is_its = [&](const BlockTrack& track) {
-      return track.stimulus == trial.stimulus && track.renderer == trial.renderer;
-    };
-    const auto track = std::find_if(tracks.begin(), tracks.end(), is_its);
-    trial.track = first_track(block) + static_cast<int>(track - tracks.begin());
-    set_intervals(block, 0, trial);
-  }
-  return trials;
-}
+const BlockRule& rule_of(const TaskBlock& block);
 
-/// Draws the orientations of a block's main trials, together with those of all blocks of the
-/// participant.
-void draw_shape_orientations(const Protocol& protocol, int participant, int index,
-                             std::vector<Trial>& trials) {
-  std::vector<std::vector<Trial>> others;
-  std::vector<Trial*> all;
-  for (int session = 1; session <= protocol.sessions.count; ++session) {
-    for (const int other : blocks_in_order(protocol, participant, session)) {
-      const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(other)];
-      if (block.practice || !has_order_of_shapes(block)) continue;
-      if (other != index) others.push_back(shapes_trials(protocol, participant, other, 0));
-      for (Trial& trial : other == index ? trials : others.back()) all.push_back(&trial);
+/// As in the study of shapes: the orientations of a participant's blocks are drawn together.
+class DrawnTogether final : public BlockRule {
+ public:
+  std::vector<Trial> trials(const Protocol& protocol, int participant, int index,
+                            std::uint64_t round) const override {
+    const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
+    const Protocol view = shapes_view(protocol, &block);
+    const auto before = std::count_if(
+        protocol.blocks.begin(), protocol.blocks.begin() + index, [&](const TaskBlock& other) {
+          return &rule_of(other) == this && other.practice == block.practice &&
+                 other.renderers == block.renderers;
+        });
+    const int number = static_cast<int>(before);
+    std::vector<Trial> trials =
+        block.practice
+            ? practice_round(view, participant, block.renderers.front(),
+                             number + 1 + static_cast<int>(round))
+            : block_of_trials(view, participant, block.renderers, number, block.repetitions);
+    const std::vector<BlockTrack> tracks = tracks_of(block);
+    for (Trial& trial : trials) {
+      trial.stimulus = block.stimuli[static_cast<std::size_t>(trial.stimulus)];
+      const auto is_its = [&](const BlockTrack& track) {
+        return track.stimulus == trial.stimulus && track.renderer == trial.renderer;
+      };
+      const auto track = std::find_if(tracks.begin(), tracks.end(), is_its);
+      trial.track = first_track(block) + static_cast<int>(track - tracks.begin());
+      set_intervals(block, 0, trial);
     }
+    return trials;
   }
-  draw_orientations(shapes_view(protocol, nullptr), participant, all);
+
+  void orient(const Protocol& protocol, int participant, int index, std::uint64_t /*round*/,
+              std::vector<Trial>& its_trials) const override {
+    if (protocol.blocks[static_cast<std::size_t>(index)].practice) return;  // drawn with the order
+    std::vector<std::vector<Trial>> others;
+    std::vector<Trial*> all;
+    for (int session = 1; session <= protocol.sessions.count; ++session) {
+      for (const int other : blocks_in_order(protocol, participant, session)) {
+        const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(other)];
+        if (block.practice || &rule_of(block) != this) continue;
+        if (other != index) others.push_back(trials(protocol, participant, other, 0));
+        for (Trial& trial : other == index ? its_trials : others.back()) all.push_back(&trial);
+      }
+    }
+    draw_orientations(shapes_view(protocol, nullptr), participant, all);
+  }
+};
+
+class DrawnAlone final : public BlockRule {
+ public:
+  std::vector<Trial> trials(const Protocol& protocol, int participant, int index,
+                            std::uint64_t round) const override {
+    return fixed_trials(protocol, participant, index, round);
+  }
+  void orient(const Protocol& protocol, int participant, int index, std::uint64_t round,
+              std::vector<Trial>& trials) const override {
+    const auto before = static_cast<std::size_t>(round) * trials.size();
+    for (std::size_t i = 0; i < trials.size(); ++i)
+      trials[i].orientation = orientation_in_block(protocol, participant,
+                                                   static_cast<std::uint64_t>(index), before + i);
+  }
+};
+
+/// Plain identification keeps the order that it had in version 1.
+const BlockRule& rule_of(const TaskBlock& block) {
+  static const DrawnTogether together;
+  static const DrawnAlone alone;
+  const bool identifies =
+      block.task == TaskKind::identify && block.procedures.empty() && block.factors.empty();
+  if (identifies && (block.renderers.size() == 1 || (!block.max_run && !block.min_distance)))
+    return together;
+  return alone;
 }
 
 }  // namespace
 
 std::vector<Trial> trials_of_block(const Protocol& protocol, int participant, int index,
                                    std::uint64_t round) {
-  const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
-  if (!has_order_of_shapes(block)) {
-    std::vector<Trial> trials = fixed_trials(protocol, participant, index, round);
-    const auto before = static_cast<std::size_t>(round) * trials.size();
-    for (std::size_t i = 0; i < trials.size(); ++i)
-      trials[i].orientation = orientation_in_block(protocol, participant,
-                                                   static_cast<std::uint64_t>(index), before + i);
-    return trials;
-  }
-  std::vector<Trial> trials = shapes_trials(protocol, participant, index, static_cast<int>(round));
-  if (!block.practice) draw_shape_orientations(protocol, participant, index, trials);
+  const BlockRule& rule = rule_of(protocol.blocks[static_cast<std::size_t>(index)]);
+  std::vector<Trial> trials = rule.trials(protocol, participant, index, round);
+  rule.orient(protocol, participant, index, round, trials);
   return trials;
 }
 
@@ -290,11 +319,7 @@ Quat orientation_in_block(const Protocol& protocol, int participant, std::uint64
 
 void check_order(const Protocol& protocol, int block) {
   const TaskBlock& checked = protocol.blocks[static_cast<std::size_t>(block)];
-  if (has_order_of_shapes(checked)) {
-    shapes_trials(protocol, 1, block, 0);
-  } else if (!is_adaptive(checked)) {
-    fixed_trials(protocol, 1, block, 0);
-  }
+  if (!is_adaptive(checked)) rule_of(checked).trials(protocol, 1, block, 0);
 }
 
 }  // namespace palpate::protocols

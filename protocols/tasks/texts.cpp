@@ -42,15 +42,12 @@ class TextPlaces {
  public:
   explicit TextPlaces(Protocol& protocol) {
     add_texts(protocol.texts);
-    if (protocol.version == 1) {
-      add_labels(protocol);
-    } else {
-      add_task_texts(protocol.texts);
-      if (std::ranges::any_of(protocol.blocks, is_reaching))
-        add("texts.go_home", protocol.texts.go_home);
-      for (TaskBlock& block : protocol.blocks) add_block(protocol, block);
-      for (PageSpec& page : protocol.pages) add_page(page);
-    }
+    add_labels(protocol);
+    add_task_texts(protocol.texts);
+    if (std::ranges::any_of(protocol.blocks, is_reaching))
+      add("texts.go_home", protocol.texts.go_home);
+    for (TaskBlock& block : protocol.blocks) add_block(protocol, block);
+    for (PageSpec& page : protocol.pages) add_page(page);
   }
   std::vector<TextPlace> take() { return std::move(places_); }
 
@@ -150,11 +147,12 @@ void check_translation(const TextPlace& place, const json& value, FaultList& fau
 
 /// The program's own texts that a participant may read.
 struct TextsRead {
-  explicit TextsRead(const Protocol& protocol) : tasks(protocol.version == 2) {
+  explicit TextsRead(const Protocol& protocol) {
     for (const TaskBlock& block : protocol.blocks) {
+      go |= !block.announced;
       intervals |=
           block.task == TaskKind::compare || (block.task == TaskKind::rate && block.standard);
-      no_question |= block.question.empty() && !block.reaching;
+      no_question |= block.announced && block.question.empty() && !block.reaching;
       numbers |= block.task == TaskKind::rate && block.answers.empty();
     }
     for (const PageSpec& page : protocol.pages) {
@@ -167,7 +165,7 @@ struct TextsRead {
     typed |= numbers;
   }
   bool of(const std::string& key) const {
-    if (key == "texts.go") return !tasks;  // a question replaces it
+    if (key == "texts.go") return go;  // else the question replaces it
     if (key == "texts.next_interval") return intervals;
     if (key == "texts.answer_now") return no_question;
     if (key == "texts.type_number") return numbers;
@@ -176,7 +174,7 @@ struct TextsRead {
     return key == "texts.agree" || key == "texts.disagree" ? consent : true;
   }
 
-  bool tasks = false, intervals = false, no_question = false, numbers = false,
+  bool go = false, intervals = false, no_question = false, numbers = false,
        numbers_of_pages = false, typed = false, consent = false;
 };
 
@@ -239,9 +237,7 @@ std::string texts_json(const Protocol& protocol) {
 std::vector<std::string> built_in_texts(const Protocol& protocol) {
   std::vector<std::string> found;
   if (!protocol.language.empty()) return found;
-  Protocol plain;
-  plain.version = protocol.version;
-  const auto own_words = texts_of(plain);
+  const auto own_words = texts_of(Protocol());
   const std::map<std::string, std::string> built_in(own_words.begin(), own_words.end());
   std::set<std::string> answers;
   for (const TaskBlock& block : protocol.blocks) {

@@ -24,7 +24,7 @@
 #include "data/stored_protocol.h"
 #include "protocols/json_document.h"
 #include "runner/commands/shared/command.h"
-#include "runner/commands/sweep/planned.h"
+#include "runner/commands/sweep/sweep_options.h"
 #include "runner/movement/movement_study.h"
 #include "runner/output/outputs.h"
 #include "runner/registration/bundle_contents.h"

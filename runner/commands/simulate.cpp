@@ -18,6 +18,7 @@
 
 #include "data/base/text.h"
 #include "protocols/parse.h"
+#include "protocols/session_plan.h"
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
 #include "runner/commands/shared/command.h"
@@ -142,9 +143,10 @@ void print_summary(const protocols::Protocol& protocol, const std::string& datab
 /// Prints blocks of tasks with no answer in a tenth or more of the trials, and remedies. In a study
 /// of shapes time-outs are the participant's own.
 void print_unanswered(const protocols::Protocol& protocol, const session::StudyProgress& progress) {
-  for (const protocols::TaskBlock& block : protocol.blocks) {
+  for (const protocols::TaskBlock* const listed : protocols::listed_blocks(protocol)) {
+    const protocols::TaskBlock& block = *listed;
     const auto found = progress.by_block.find(block.name);
-    if (found == progress.by_block.end() || block.order == protocols::BlockOrder::shapes) continue;
+    if (found == progress.by_block.end()) continue;
     const auto& [trials, unanswered] = found->second;
     if (unanswered * 10 < trials || unanswered == 0) continue;
     std::fprintf(stderr, "block '%s': %lld of %lld trials had no answer within time_out_s = %g s",

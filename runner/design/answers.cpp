@@ -52,9 +52,8 @@ bool reads_files(const Protocol& protocol) {
 
 Json in_words(const Protocol& protocol) {
   Json out = Json::array();
-  for (const protocols::TaskBlock& block : protocol.blocks) {
-    if (!block.name.empty()) out.push_back({block.name, study::in_words(protocol, block)});
-  }
+  for (const protocols::TaskBlock* const block : protocols::listed_blocks(protocol))
+    out.push_back({block->name, study::in_words(protocol, *block)});
   return out;
 }
 

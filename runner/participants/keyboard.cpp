@@ -1,22 +1,13 @@
 #include "runner/participants/keyboard.h"
 
-#include <fcntl.h>
-#include <poll.h>
-#include <sys/eventfd.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
-#include <cstring>
 #include <glm/geometric.hpp>
 #include <iterator>
-#include <stdexcept>
 #include <utility>
 
 #include "data/base/text.h"
@@ -119,49 +110,6 @@ bool is_turn(const protocols::TaskBlock& block, const Answer& answer) {
   return act == "up" || act == "down";
 }
 
-constexpr int kUsualBaud = 9600;
-constexpr std::array<std::pair<int, speed_t>, 9> kSpeeds = {{{1200, B1200},
-                                                             {2400, B2400},
-                                                             {4800, B4800},
-                                                             {9600, B9600},
-                                                             {19200, B19200},
-                                                             {38400, B38400},
-                                                             {57600, B57600},
-                                                             {115200, B115200},
-                                                             {230400, B230400}}};
-
-/// Path and speed of "PATH[:BAUD]".
-std::pair<std::string, speed_t> port_of(const std::string& name) {
-  const std::size_t colon = name.rfind(':');
-  int baud = kUsualBaud;
-  std::string path = name;
-  const std::size_t digits = name.find_first_not_of("0123456789", colon + 1);
-  if (colon != std::string::npos && colon + 1 < name.size() && digits == std::string::npos) {
-    if (std::from_chars(name.data() + colon + 1, name.data() + name.size(), baud).ec != std::errc())
-      baud = 0;
-    path = name.substr(0, colon);
-  }
-  const auto* const speed = std::find_if(kSpeeds.begin(), kSpeeds.end(),
-                                         [baud](const auto& one) { return one.first == baud; });
-  if (path.empty() || speed == kSpeeds.end())
-    throw std::invalid_argument("no serial port '" + name +
-                                "'; expected PATH[:BAUD] with a usual speed, such as 9600");
-  return {path, speed->second};
-}
-
-std::map<unsigned char, std::string> bytes_of(const std::map<std::string, std::string>& keys) {
-  std::map<unsigned char, std::string> bytes;
-  for (const auto& [input, key] : keys) {
-    unsigned value = static_cast<unsigned char>(input[0]);
-    if (input.size() == 4) std::from_chars(input.data() + 2, input.data() + 4, value, 16);
-    bytes[static_cast<unsigned char>(value)] = key;
-  }
-  for (unsigned char c = '!'; keys.empty() && c <= '~'; ++c)
-    bytes[c] = std::string(1, static_cast<char>(c));
-  if (keys.empty()) bytes[' '] = "space";
-  return bytes;
-}
-
 }  // namespace
 
 KeyboardRespondent::KeyboardRespondent(const protocols::Protocol& protocol,
@@ -172,7 +120,7 @@ KeyboardRespondent::KeyboardRespondent(const protocols::Protocol& protocol,
     const auto stimulus = std::find_if(
         protocol.stimuli.begin(), protocol.stimuli.end(),
         [&wanted = name](const protocols::StimulusSpec& s) { return s.name == wanted; });
-    stimuli_.push_back(static_cast<int>(std::distance(protocol.stimuli.begin(), stimulus)));
+    answers_.emplace_back(key, static_cast<int>(std::distance(protocol.stimuli.begin(), stimulus)));
     keys_.emplace_back(by != AnswerBy::buttons ? key : "button " + std::to_string(keys_.size() + 1),
                        protocols::answer_label(protocol, name));
   }
@@ -301,8 +249,7 @@ void KeyboardRespondent::feedback(bool correct) {
 
 void KeyboardRespondent::begin_trial(const protocols::Trial& trial) {
   screen_.frames();  // of a trial that was cut off
-  const protocols::TaskBlock& block = protocols::block_of(protocol_, trial);
-  block_ = block.order == protocols::BlockOrder::shapes ? nullptr : &block;
+  block_ = &protocols::block_of(protocol_, trial);
   display::Page page;
   page.kind = display::Page::Kind::neutral;
   page.keys = keys_;
@@ -329,20 +276,17 @@ void KeyboardRespondent::show_cue(const servo::Sample& sample) {
   const bool away = cue == Cue::move_away || cue == Cue::go_home;
   page_.kind = away ? display::Page::Kind::message : display::Page::Kind::neutral;
   page_.go = cue == Cue::go;
-  page_.text = cue == Cue::go        ? texts.go
+  page_.text = cue == Cue::go        ? interval_text()
                : cue == Cue::ready   ? texts.ready
                : cue == Cue::go_home ? texts.go_home
                                      : texts.move_away;
   if (cue == Cue::ready) attendant_.sound(SoundCue::ready);
-  if (block_ != nullptr) {
-    if (cue == Cue::go) page_.text = interval_text();
-    const bool types = cue == Cue::go && view_.answers && block_->answers.empty();
-    page_.typing = types ? display::Page::Typing::number : display::Page::Typing::none;
-    least_ = block_->least;
-    most_ = block_->most;
-    page_.wheel =
-        cue == Cue::go && block_->task == protocols::TaskKind::adjust && by_ == AnswerBy::keys;
-  }
+  const bool types = cue == Cue::go && view_.answers && block_->answers.empty();
+  page_.typing = types ? display::Page::Typing::number : display::Page::Typing::none;
+  least_ = block_->least;
+  most_ = block_->most;
+  page_.wheel =
+      cue == Cue::go && block_->task == protocols::TaskKind::adjust && by_ == AnswerBy::keys;
   screen_.show(page_);
 }
 
@@ -354,45 +298,18 @@ void KeyboardRespondent::show_way(const servo::Sample& sample) {
   screen_.show(page_);
 }
 
-std::optional<int> KeyboardRespondent::meaning(const std::string& key) const {
-  if (by_ == AnswerBy::buttons) return std::nullopt;
-  for (std::size_t i = 0; i < keys_.size(); ++i) {
-    if (protocols::one_key(keys_[i].first) == protocols::one_key(key)) return stimuli_[i];
-  }
-  return std::nullopt;
-}
-
 void KeyboardRespondent::listen(const servo::Sample& sample) {
   const std::vector<display::KeyPress> presses = take_keys();
   for (std::size_t i = 0; i < presses.size(); ++i) {
-    const display::KeyPress& press = presses[i];
-    if (block_ != nullptr) {
-      if (listen_to_task(press)) continue;
-      spoken_.assign(presses.begin() + static_cast<std::ptrdiff_t>(i), presses.end());
-      break;
-    }
-    if (pending_) continue;
-    const std::optional<int> stimulus = meaning(press.key);
-    if (stimulus && onset_ns_ > 0 && press.time_ns >= onset_ns_) {
-      pending_ = Answer{*stimulus, press.time_ns};
-    } else {
-      reply();
-    }
+    if (listen_to(presses[i])) continue;
+    spoken_.assign(presses.begin() + static_cast<std::ptrdiff_t>(i), presses.end());
+    break;
   }
   end_reply();
   const unsigned pressed = sample.buttons & ~static_cast<unsigned>(buttons_);
   buttons_ = sample.buttons;
-  if (by_ != AnswerBy::buttons || pending_ || onset_ns_ == 0) return;
-  if (block_ != nullptr) {
+  if (by_ == AnswerBy::buttons && !pending_ && onset_ns_ != 0)
     listen_to_buttons(pressed, sample.time_ns);
-    return;
-  }
-  for (std::size_t i = 0; i < stimuli_.size() && i < 8; ++i) {
-    if ((pressed >> i & 1U) != 0) {
-      pending_ = Answer{stimuli_[i], sample.time_ns};
-      return;
-    }
-  }
 }
 
 std::optional<Answer> KeyboardRespondent::step(const servo::Sample& sample) {
@@ -408,8 +325,6 @@ std::optional<Answer> KeyboardRespondent::step(const servo::Sample& sample) {
   attendant_.attend();
   return std::nullopt;
 }
-
-// The part of KeyboardRespondent for version 2: intervals, typed numbers, confidence, pages.
 
 std::optional<std::string> accepted_answer(const protocols::PageItem& item,
                                            const std::string& typed) {
@@ -452,8 +367,10 @@ void KeyboardRespondent::begin_interval(const protocols::Trial& trial, const Int
   pending_.reset();
   if (view.continues) return;  // the page stays, and no key press is lost
   keys_.clear();
+  answers_.clear();
   if (view.answers && !block_->reaching) {
     for (const protocols::TaskAnswer& answer : block_->answers) {
+      answers_.emplace_back(answer.key, static_cast<int>(answers_.size()));
       const std::string button = "button " + std::to_string(keys_.size() + 1);
       keys_.emplace_back(by_ == AnswerBy::buttons ? button : answer.key, answer.label);
     }
@@ -474,6 +391,7 @@ void KeyboardRespondent::begin_interval(const protocols::Trial& trial, const Int
 /// The text shown during an interval: its number and the question.
 std::string KeyboardRespondent::interval_text() const {
   const auto& texts = protocol_.texts;
+  if (!block_->announced) return texts.go;
   std::string text;
   if (view_.intervals > 1 && view_.felt)
     text = std::to_string(view_.interval) + " / " + std::to_string(view_.intervals) + "\n";
@@ -485,7 +403,7 @@ std::string KeyboardRespondent::interval_text() const {
   return text;
 }
 
-bool KeyboardRespondent::listen_to_task(const display::KeyPress& press) {
+bool KeyboardRespondent::listen_to(const display::KeyPress& press) {
   const bool in_time = view_.continues || (onset_ns_ > 0 && press.time_ns >= onset_ns_);
   if (!in_time) {
     reply();
@@ -563,10 +481,10 @@ std::optional<Answer> KeyboardRespondent::meaning_in_interval(const std::string&
   if (asked.answers.empty()) return typed_answer(key);
   const bool adjusts = asked.task == TaskKind::adjust;
   const char* const wheel = key == "wheel up" ? "up" : key == "wheel down" ? "down" : "";
-  for (std::size_t i = 0; i < asked.answers.size() && by_ != AnswerBy::buttons; ++i) {
+  for (std::size_t i = 0; i < answers_.size() && by_ != AnswerBy::buttons; ++i) {
     const bool turned = adjusts && asked.answers[i].name == wheel;
-    if (protocols::one_key(asked.answers[i].key) != protocols::one_key(key) && !turned) continue;
-    answer.stimulus = static_cast<int>(i);
+    if (protocols::one_key(answers_[i].first) != protocols::one_key(key) && !turned) continue;
+    answer.stimulus = answers_[i].second;
     if (view_.interval == 2 && is_turn(asked, answer)) break;  // the standard is not turned
     return answer;
   }
@@ -580,10 +498,10 @@ void KeyboardRespondent::listen_to_buttons(unsigned pressed, std::int64_t time_n
   Answer answer;
   answer.time_ns = time_ns;
   answer.continues = !view_.answers;
-  const std::size_t count = view_.answers ? block_->answers.size() : 8;
+  const std::size_t count = view_.answers ? answers_.size() : 8;
   for (std::size_t i = 0; i < count && i < 8; ++i) {
     if ((pressed >> i & 1U) == 0) continue;
-    answer.stimulus = static_cast<int>(i);
+    answer.stimulus = view_.answers ? answers_[i].second : static_cast<int>(i);
     if (view_.answers && view_.interval == 2 && is_turn(*block_, answer)) return reply();
     pending_ = answer;
     return;
@@ -813,100 +731,6 @@ std::optional<std::string> KeyboardRespondent::ask(const protocols::PageSpec& pa
   }
   const bool choice = item.kind == Kind::choice || item.kind == Kind::scale;
   return choice ? ask_choice(item, how) : ask_typed(item, how);
-}
-
-ResponseBox::ResponseBox(const std::string& name, const std::map<std::string, std::string>& keys,
-                         servo::Clock& clock, std::function<void()> emergency)
-    : keys_(bytes_of(keys)), clock_(clock), emergency_(std::move(emergency)) {
-  const std::pair<std::string, speed_t> port = port_of(name);
-  const std::string& path = port.first;
-  port_ = ::open(path.c_str(), O_RDONLY | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-  const auto refuse = [&](const std::string& why) {
-    if (port_ >= 0) ::close(port_);
-    throw std::runtime_error("the response box at " + path + ": " + why);
-  };
-  if (port_ < 0) refuse(std::strerror(errno));
-  if (tcgetattr(port_, &before_) != 0) refuse("it is not a serial port");
-  termios raw = before_;
-  cfmakeraw(&raw);
-  raw.c_cflag |= static_cast<tcflag_t>(CLOCAL | CREAD);
-  cfsetispeed(&raw, port.second);
-  cfsetospeed(&raw, port.second);
-  if (tcsetattr(port_, TCSANOW, &raw) != 0) refuse(std::strerror(errno));
-  tcflush(port_, TCIFLUSH);  // drop bytes sent before the start
-  wake_ = eventfd(0, EFD_CLOEXEC);
-  if (wake_ < 0) refuse(std::strerror(errno));
-  thread_ = std::jthread([this] { listen(); });
-}
-
-ResponseBox::~ResponseBox() {
-  eventfd_write(wake_, 1);
-  thread_.join();
-  tcsetattr(port_, TCSANOW, &before_);
-  ::close(wake_);
-  ::close(port_);
-}
-
-void ResponseBox::listen() noexcept {
-  std::array<pollfd, 2> files = {{{wake_, POLLIN, 0}, {port_, POLLIN, 0}}};
-  while (true) {
-    if (poll(files.data(), files.size(), -1) < 0) {
-      if (errno == EINTR) continue;
-      break;
-    }
-    if (files[0].revents != 0) return;
-    std::array<unsigned char, 64> bytes{};
-    const ssize_t got = read(port_, bytes.data(), bytes.size());
-    const std::int64_t now = clock_.now_ns();
-    if (got < 0 && (errno == EINTR || errno == EAGAIN)) continue;
-    if (got <= 0) break;
-    for (ssize_t i = 0; i < got; ++i) {
-      const auto key = keys_.find(bytes[static_cast<std::size_t>(i)]);
-      if (key == keys_.end()) {
-        const unsigned char byte = bytes[static_cast<std::size_t>(i)];
-        int none = -1;
-        if (byte != '\r' && byte != '\n') unknown_.compare_exchange_strong(none, byte);
-        continue;
-      }
-      if (key->second == "escape") emergency_();
-      presses_.add({key->second, now});
-    }
-  }
-  failed_ = true;
-}
-
-std::optional<unsigned char> ResponseBox::unknown_byte() const {
-  const int byte = unknown_.load();
-  if (byte < 0) return std::nullopt;
-  return static_cast<unsigned char>(byte);
-}
-
-std::string ScreenWithBox::trouble() const {
-  if (box_.failed())
-    return "the response box is unplugged: answer by keyboard; to use the box, plug it in and "
-           "restart";
-  std::string trouble = screen_.trouble();
-  if (!trouble.empty()) return trouble;  // matters more than an unknown byte
-  if (const auto byte = box_.unknown_byte()) {
-    char text[160];
-    std::snprintf(
-        text, sizeof text,
-        "the response box sent a byte that stands for no key (0x%02x): check its speed in "
-        "--response-box and the bytes in the protocol's responses",
-        static_cast<unsigned>(*byte));
-    return text;
-  }
-  return {};
-}
-
-std::vector<display::KeyPress> ScreenWithBox::keys() {
-  std::vector<display::KeyPress> keys = screen_.keys();
-  const std::vector<display::KeyPress> more = box_.take();
-  keys.insert(keys.end(), more.begin(), more.end());
-  std::stable_sort(
-      keys.begin(), keys.end(),
-      [](const display::KeyPress& a, const display::KeyPress& b) { return a.time_ns < b.time_ns; });
-  return keys;
 }
 
 }  // namespace palpate::runner::participants

@@ -1,21 +1,13 @@
 #pragma once
 // A human participant, who answers with keys (digit row or numeric pad) or buttons of the device.
 
-#include <termios.h>
-
-#include <atomic>
 #include <cstdint>
-#include <deque>
-#include <functional>
-#include <map>
 #include <optional>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "protocols/protocol.h"
 #include "runner/display/display.h"
-#include "runner/display/mailbox.h"
 #include "runner/participants/respondent.h"
 
 namespace palpate::runner::participants {
@@ -86,15 +78,13 @@ class KeyboardRespondent final : public Respondent {
   void wait_until(std::int64_t when_ns);
   void wait_for_space(std::int64_t since_ns);
   void listen(const servo::Sample& sample);
-  std::optional<int> meaning(const std::string& key) const;
-  // Version 2
   using Keys = std::vector<std::pair<std::string, std::string>>;
   std::string interval_text() const;
   /// \return the answer, if the key ends the interval
   std::optional<Answer> meaning_in_interval(const std::string& key);
   void listen_to_buttons(unsigned pressed, std::int64_t time_ns);
-  std::vector<display::KeyPress> take_keys();           ///< pressed, or typed by the experimenter
-  bool listen_to_task(const display::KeyPress& press);  ///< false: to be handled after a turn
+  std::vector<display::KeyPress> take_keys();      ///< pressed, or typed by the experimenter
+  bool listen_to(const display::KeyPress& press);  ///< false: to be handled after a turn
   std::optional<Answer> typed_answer(const std::string& key);
   bool type(const std::string& key);  ///< false: the key does not type
   void reply_with(const std::string& text);
@@ -118,8 +108,9 @@ class KeyboardRespondent final : public Respondent {
   servo::Clock& clock_;
   AnswerBy by_;
   std::vector<std::pair<std::string, std::string>> keys_;  ///< as displayed
-  std::vector<int> stimuli_;                               ///< of keys_, in order
-  display::Page page_;                                     ///< displayed now
+  /// Keys of the answers that the trial expects, in the order of the buttons, and what they give.
+  std::vector<std::pair<std::string, int>> answers_;
+  display::Page page_;  ///< displayed now
   int done_ = 0, trials_ = 0;
   std::int64_t reply_until_ns_ = 0;  ///< 0: no reply is shown
   Cue cue_ = Cue::none;
@@ -127,73 +118,13 @@ class KeyboardRespondent final : public Respondent {
   std::int64_t onset_ns_ = 0;      ///< of the trial; 0: not yet
   std::uint8_t buttons_ = 0xFF;    ///< down at the last tick
   std::optional<Answer> pending_;  ///< given; waits until the servo's samples reach its time
-  const protocols::TaskBlock* block_ = nullptr;  ///< of the trial; may be null
+  const protocols::TaskBlock* block_ = nullptr;  ///< of the trial
   IntervalView view_;
   bool sees_ = false;              ///< something of the interval is seen
   std::int64_t way_shown_ns_ = 0;  ///< of a movement's picture
   bool early_ = false;             ///< a trial or interval is prepared but cannot be answered yet
   std::optional<double> least_, most_;     ///< range of the number being typed
   std::vector<display::KeyPress> spoken_;  ///< spoken answers as keys, and keys not handled yet
-};
-
-// A response box on a serial port: each byte stands for a key of the keyboard.
-
-class ResponseBox {
- public:
-  /// \param name  "PATH" or "PATH:BAUD" (default 9600), 8N1. The path may contain colons
-  /// (/dev/serial/by-path/...)
-  /// \param keys  byte ("1", "0x05") -> name of a key; empty: printable characters stand for
-  /// themselves. "escape" is the emergency key
-  /// \param clock  time-stamps bytes on arrival; must outlive it
-  /// \param emergency  called at once, in the box's own thread
-  /// \throws std::invalid_argument: not a speed of a serial port; std::runtime_error: cannot be
-  /// opened
-  ResponseBox(const std::string& name, const std::map<std::string, std::string>& keys,
-              servo::Clock& clock, std::function<void()> emergency);
-  ~ResponseBox();
-  ResponseBox(const ResponseBox&) = delete;
-  ResponseBox& operator=(const ResponseBox&) = delete;
-
-  /// Keys pressed since the last call, in order of arrival.
-  std::vector<display::KeyPress> take() { return presses_.take(); }
-  /// It was unplugged or its port failed; it sends no more keys.
-  bool failed() const { return failed_.load(); }
-  /// The first byte that stands for no key, line ends ignored. nullopt: there was none
-  std::optional<unsigned char> unknown_byte() const;
-
- private:
-  void listen() noexcept;
-
-  std::map<unsigned char, std::string> keys_;
-  servo::Clock& clock_;
-  const std::function<void()> emergency_;
-  int port_ = -1, wake_ = -1;
-  termios before_{};
-  display::EventQueue<display::KeyPress> presses_;
-  std::atomic<bool> failed_{false};
-  std::atomic<int> unknown_{-1};  ///< byte; -1: none
-  std::jthread thread_;
-};
-
-/// The participant's screen with a box beside its keyboard.
-class ScreenWithBox final : public display::ParticipantScreen {
- public:
-  /// Both must outlive it.
-  ScreenWithBox(display::ParticipantScreen& screen, ResponseBox& box)
-      : screen_(screen), box_(box) {}
-  void show(const display::Page& page) override { screen_.show(page); }
-  void see(const std::shared_ptr<const display::SeenTrial>& trial) override { screen_.see(trial); }
-  void follow(const servo::Sample& sample) override { screen_.follow(sample); }
-  std::vector<display::SeenFrame> frames() override { return screen_.frames(); }
-  std::vector<display::KeyPress> keys() override;
-  bool open() const override { return screen_.open(); }
-  bool settled() const override { return screen_.settled(); }
-  std::string misplaced() const override { return screen_.misplaced(); }
-  std::string trouble() const override;
-
- private:
-  display::ParticipantScreen& screen_;
-  ResponseBox& box_;
 };
 
 }  // namespace palpate::runner::participants

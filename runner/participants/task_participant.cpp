@@ -85,7 +85,6 @@ std::vector<int> forms_of(const protocols::Protocol& protocol, const protocols::
 /// Whether the observer of shapes can identify a block's stimuli.
 bool is_identified_by_shape(const protocols::Protocol& protocol,
                             const protocols::TaskBlock& block) {
-  if (block.order == protocols::BlockOrder::shapes) return true;
   if (block.task != protocols::TaskKind::identify || !protocols::targets_of(block).empty())
     return false;
   const std::vector<int> forms = forms_of(protocol, block);

@@ -7,6 +7,7 @@
 #include "analysis/report/plan_report.h"
 #include "analysis/text.h"
 #include "protocols/schedule.h"
+#include "protocols/session_plan.h"
 #include "runner/registration/planned_conditions.h"
 
 namespace palpate::runner::registration {
@@ -121,8 +122,8 @@ std::string accuracy_in_words() {
 }
 
 std::unique_ptr<StudyAnswers> study_answers(const Registration& made) {
-  return protocols::study_of_shapes(made.protocol) ? identification_answers(made)
-                                                   : task_answers(made);
+  return protocols::is_study_of_shapes(made.protocol) ? identification_answers(made)
+                                                      : task_answers(made);
 }
 
 }  // namespace palpate::runner::registration

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "runner/registration/planned_studies.h"
 #include "runner/registration/registration.h"
 
 namespace palpate::runner::registration {
@@ -51,6 +52,8 @@ class StudyAnswers {
   virtual std::vector<Paragraph> missing() const = 0;
   /// How the rehearsed studies were made, in sentences behind their numbers.
   virtual std::string rehearsal() const = 0;
+  /// Studies as the plan expects them.
+  virtual std::unique_ptr<PlannedStudies> planned() const = 0;
   /// What simulated/ holds, for its README.
   virtual std::string simulated() const = 0;
 

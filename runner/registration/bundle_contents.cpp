@@ -202,7 +202,7 @@ study::ShownTrial shown_trial(const TrialFields& of, std::size_t row, int sessio
                   point_of(of, row, dimensions)};
   out.outcome.success = of.flag(row, "success");
   out.outcome.level = level_of(of, row);
-  out.outcome.point = out.row.task->point;
+  out.outcome.point = out.row.task.point;
   return out;
 }
 
@@ -286,14 +286,11 @@ struct Design {
 
 /// \param registered  its trials are analysed, unless the study has none of its name; none: all
 Design design_of(const Registration* registered, const analysis::StudyRecord& record) {
-  if (registered == nullptr) {
-    const bool of_shapes =
-        std::ranges::all_of(record.protocols, [](const analysis::ProtocolText& one) {
-          return data::read_stored_protocol(one.text).blocks.empty();
-        });
-    return {of_shapes ? std::vector<analysis::ProtocolText>() : record.protocols, ""};
-  }
-  if (protocols::study_of_shapes(registered->protocol)) return {};
+  std::vector<std::string> texts;
+  for (const analysis::ProtocolText& one : record.protocols) texts.push_back(one.text);
+  if (registered != nullptr) texts = {registered->protocol.source_text};
+  if (!data::have_blocks(texts)) return {};
+  if (registered == nullptr) return {record.protocols, ""};
   const std::string& name = registered->protocol.name;
   const bool there = std::ranges::find(record.protocols, name, &analysis::ProtocolText::name) !=
                      record.protocols.end();

@@ -52,18 +52,13 @@ study::ShownTrial shown_trial(const data::TrialRecord& record) {
   out.practice = record.practice;
   out.outcome = session::outcome_of(record);
   const data::TaskRecord& task = record.task;
-  if (!task.of_block()) return out;
-  out.row.task = {record.block,
-                  task.block_name,
-                  task.track,
-                  task.level,
-                  task.catch_trial,
-                  0,
-                  task.reach ? task.reach->kind : "",
-                  out.outcome.point};
+  int comparison = 0;
   for (std::size_t i = 0; task.task == "compare" && i < task.intervals.size(); ++i) {
-    if (!task.intervals[i].standard) out.row.task->comparison = static_cast<int>(i) + 1;
+    if (!task.intervals[i].standard) comparison = static_cast<int>(i) + 1;
   }
+  out.row.task =
+      study::compared({record.block, task.block_name, task.track, task.level, task.catch_trial,
+                       comparison, task.reach ? task.reach->kind : "", out.outcome.point});
   return out;
 }
 
@@ -324,15 +319,16 @@ std::string orders_text(const Registration& statement, const StudyData& study) {
   if (registered.empty()) return "";
   OrderCounts shown;
   for (const StudyParticipant& one : study.participants) {
-    if (const std::string order = study::condition_order(one.shown); !order.empty()) ++shown[order];
+    const std::string order = study::condition_order(statement.protocol, one.shown);
+    if (!order.empty()) ++shown[order];
   }
   for (const auto& [order, n] : shown) registered.try_emplace(order, 0);
   std::string out;
   for (const auto& [order, n] : registered)
     out += (out.empty() ? "" : "; ") + printable(order) + ": " + std::to_string(shown[order]) +
            " (" + std::to_string(n) + " registered)";
-  return std::string("Order of the ") + study::conditions_in_words(statement.protocol) + ": " +
-         out + ".";
+  return std::string("Order of the ") + statement.protocol.order_rule->conditions_in_words() +
+         ": " + out + ".";
 }
 
 /// Who began a session and completed no trial, each once.
@@ -478,7 +474,7 @@ std::string movements_text(const Movements& counts) {
 std::map<std::string, Movements> movements_of(const std::vector<study::OrderRow>& rows) {
   std::map<std::string, Movements> out;
   for (const study::OrderRow& row : rows) {
-    if (row.task && !row.task->reach.empty()) ++out[row.task->name][row.task->reach];
+    if (!row.task.reach.empty()) ++out[row.task.name][row.task.reach];
   }
   return out;
 }

@@ -190,6 +190,7 @@ class IdentificationAnswers final : public StudyAnswers {
            plain(std::round(10 * made_.typical_time) / 10) + " s was assumed.";
   }
 
+  std::unique_ptr<PlannedStudies> planned() const override { return planned_identification(made_); }
   std::string simulated() const override {
     return "Drawn from the model of plan.json, in the registered orders of "
            "trials: no person took part. `planned-effect.csv` has the effects that the study "

@@ -545,8 +545,11 @@ std::string PlannedTasks::analyzed(std::size_t study, bool with_effect) const {
 
 }  // namespace
 
-std::unique_ptr<PlannedStudies> planned_studies(const Registration& made) {
-  if (protocols::study_of_shapes(made.protocol)) return std::make_unique<PlannedTimes>(made);
+std::unique_ptr<PlannedStudies> planned_identification(const Registration& made) {
+  return std::make_unique<PlannedTimes>(made);
+}
+
+std::unique_ptr<PlannedStudies> planned_tasks(const Registration& made) {
   return std::make_unique<PlannedTasks>(made);
 }
 

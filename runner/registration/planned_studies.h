@@ -31,7 +31,9 @@ class PlannedStudies {
 
 /// \param made  with protocol, plan, number of participants, seed and settings; must outlive it
 /// \throws UsageError: its tasks cannot be simulated
-std::unique_ptr<PlannedStudies> planned_studies(const Registration& made);
+std::unique_ptr<PlannedStudies> planned_tasks(const Registration& made);
+/// The study of shapes, drawn from the plan's model.
+std::unique_ptr<PlannedStudies> planned_identification(const Registration& made);
 
 /// s; the plan has only ratios of times, so this is the geometric middle between the limit of too
 /// fast answers and the time-out, to lose the fewest trials at either end. 0: nothing is

@@ -14,6 +14,7 @@
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "protocols/schedule.h"
+#include "protocols/session_plan.h"
 #include "protocols/tasks/block_order.h"
 #include "runner/registration/sealed_folder.h"
 #include "runner/study/study_order.h"
@@ -409,7 +410,7 @@ void require_registrable(const protocols::Protocol& protocol, const std::string&
   if (protocols::is_external(protocol))
     throw UsageError(path + ": /blocks: expected blocks whose trials the protocol determines: " +
                      "another program chooses those of a block 'external'");
-  if (protocols::study_of_shapes(protocol) && protocol.renderers.size() != 2)
+  if (protocols::is_study_of_shapes(protocol) && protocol.renderers.size() != 2)
     throw UsageError(path + ": /renderers: expected two renderers to compare, point and ray");
 }
 

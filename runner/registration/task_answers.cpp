@@ -501,6 +501,7 @@ class TaskAnswers final : public StudyAnswers {
     return out;
   }
 
+  std::unique_ptr<PlannedStudies> planned() const override { return planned_tasks(made_); }
   std::string simulated() const override {
     return "Simulated participants did the protocol's trials in the loop of `palpate simulate` "
            "and " +

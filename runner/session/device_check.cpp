@@ -511,9 +511,9 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
                  sentence(" has ", of_parts, can.reason, ": soften /material, raise ",
                           "/servo/rate_hz, ", protocol.reach ? "lessen /reach/factor, " : "",
                           passivity_advice(protocol, material, device, can),
-                          protocols::study_of_shapes(protocol)
-                              ? "or have it limited by /servo/material_limit \"limit\""
-                              : "or keep the levels below"));
+                          protocol.materials_vary
+                              ? "or keep the levels below"
+                              : "or have it limited by /servo/material_limit \"limit\""));
     };
     const bool surface = stimulus.object.shape != stimuli::ShapeKind::none;
     if (surface)

@@ -1,6 +1,6 @@
 #pragma once
-// The record of a live session: its participant, run, notes and trials. Also the way of the trial
-// loop to the database.
+// The record of a live session: its participant, run, notes and trials, and the interface through
+// which the trial loop writes them.
 
 #include <cstdint>
 #include <optional>
@@ -31,8 +31,8 @@ inline bool same_body(const data::BodyRecord& a, const data::BodyRecord& b) {
          a.velocity == b.velocity && a.spin == b.spin;
 }
 
-/// From a parsed protocol to the record of it.
-/// A protocol as the store keeps it: its text, and the contents of every file that it names.
+/// Converts a protocol to its record: its text, and the contents of
+/// every file that it names.
 data::ProtocolInfo info_of(const protocols::Protocol& protocol);
 
 // The trial log: the trial loop's interface to the database.

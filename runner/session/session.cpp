@@ -166,7 +166,7 @@ servo::HomeZone Session::home_of(const protocols::Interval& interval, double res
 
 void Session::report_interval(const protocols::Trial& trial,
                               const participants::IntervalView& view) {
-  if (task_of(trial).order == protocols::BlockOrder::shapes) return;
+  if (!task_of(trial).announced) return;
   if (events_ != nullptr) events_->interval(trial, view);
   participant_.begin_interval(trial, view);
 }
@@ -521,8 +521,8 @@ Session::Session(const Station& station, participants::Respondent& participant,
       events_(events),
       least_reach_(least_reach),
       scenes_(station.protocol, &station.library) {
-  if (protocols::study_of_shapes(station.protocol)) return;
-  least_reach_ = std::max(least_reach, largest_reach(station));  // the same for every level
+  if (station.protocol.home.beyond_all)
+    least_reach_ = std::max(least_reach, largest_reach(station));  // the same for every level
 }
 
 bool Session::ServoState::tripped() const { return (faults & servo::servo_fault::kTripped) != 0; }

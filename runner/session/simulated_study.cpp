@@ -18,6 +18,7 @@
 #include "protocols/difference.h"
 #include "protocols/groups.h"
 #include "protocols/schedule.h"
+#include "protocols/session_plan.h"
 #include "protocols/tasks/block_order.h"
 #include "runner/build_info.h"
 #include "runner/participants/simulated.h"
@@ -350,6 +351,65 @@ class SimulatedGroups {
   std::vector<std::unique_ptr<SimulatedStudy>> studies_;
 };
 
+/// How participants of a kind of study are simulated.
+class SimulatedKind {
+ public:
+  virtual ~SimulatedKind() = default;
+  /// Reasons why they cannot be.
+  virtual std::vector<std::string> faults(const protocols::Protocol& protocol) const = 0;
+  virtual participants::BlockHypotheses hypotheses(const protocols::Protocol& protocol) const = 0;
+  virtual std::unique_ptr<participants::Respondent> participant(
+      const SimulatedStudy& study, const participants::SimulatedSettings& own, int number,
+      devices::SimulatedStylus& stylus) const = 0;
+};
+
+/// They identify every stimulus by its shape.
+class SimulatedShapes final : public SimulatedKind {
+ public:
+  std::vector<std::string> faults(const protocols::Protocol& protocol) const override {
+    std::vector<std::string> out;
+    for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
+      const std::string fault = participants::ShapeHypotheses::fault_of(stimulus.object);
+      if (!fault.empty()) out.push_back("stimulus '" + stimulus.name + "': " + fault);
+    }
+    return out;
+  }
+  participants::BlockHypotheses hypotheses(const protocols::Protocol& protocol) const override {
+    std::vector<stimuli::ObjectSpec> objects;
+    for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
+      objects.push_back(stimulus.object);
+    return {std::make_shared<const participants::ShapeHypotheses>(objects)};
+  }
+  std::unique_ptr<participants::Respondent> participant(
+      const SimulatedStudy& study, const participants::SimulatedSettings& own, int number,
+      devices::SimulatedStylus& stylus) const override {
+    return std::make_unique<participants::SimulatedParticipant>(
+        own, *study.of_blocks.front(), stylus, study.protocol, study.seed, number);
+  }
+};
+
+class SimulatedTasks final : public SimulatedKind {
+ public:
+  std::vector<std::string> faults(const protocols::Protocol&) const override { return {}; }
+  participants::BlockHypotheses hypotheses(const protocols::Protocol& protocol) const override {
+    return participants::block_hypotheses(protocol);
+  }
+  std::unique_ptr<participants::Respondent> participant(
+      const SimulatedStudy& study, const participants::SimulatedSettings& own, int number,
+      devices::SimulatedStylus& stylus) const override {
+    return std::make_unique<participants::TaskParticipant>(own, study.hypotheses, study.of_blocks,
+                                                           stylus, study.protocol, study.seed,
+                                                           number, study.planned);
+  }
+};
+
+const SimulatedKind& kind_of(const protocols::Protocol& protocol) {
+  static const SimulatedShapes shapes;
+  static const SimulatedTasks tasks;
+  if (protocols::is_study_of_shapes(protocol)) return shapes;
+  return tasks;
+}
+
 devices::SimulatedStylus simulated_stylus(const protocols::Protocol& protocol,
                                           const participants::SimulatedSettings& settings) {
   return {settings.device, settings.hand, protocol.stylus.length, protocol.stylus.grip,
@@ -365,7 +425,7 @@ SimulatedStudy::SimulatedStudy(const protocols::Protocol& p,
       library(p),
       // Two equal shapes are never told apart, so the observer continues to perceive.
       hypotheses({stimuli::ObjectSpec{}, stimuli::ObjectSpec{}}),
-      of_blocks(participants::block_hypotheses(checked(p, library, s))),
+      of_blocks(kind_of(checked(p, library, s)).hypotheses(p)),
       seed(seed_) {}
 
 void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& session,
@@ -379,16 +439,8 @@ void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& 
   servo::Servo servo(stylus, clock, protocol.servo_rate, servo::ForceLimits{},
                      workspace_of(protocol));
   if (protocol.passivity_controller) servo.control_passivity();
-  std::unique_ptr<participants::Respondent> participant;
-  if (const std::optional<int> shapes = protocols::study_of_shapes(protocol)) {
-    participant = std::make_unique<participants::SimulatedParticipant>(
-        own, *study.of_blocks[static_cast<std::size_t>(*shapes)], stylus, protocol, study.seed,
-        session.participant);
-  } else {
-    participant = std::make_unique<participants::TaskParticipant>(
-        own, study.hypotheses, study.of_blocks, stylus, protocol, study.seed, session.participant,
-        study.planned);
-  }
+  const std::unique_ptr<participants::Respondent> participant =
+      kind_of(protocol).participant(study, own, session.participant, stylus);
   const Station station{protocol, study.library, session.plan, servo,
                         clock,    session.utc,   log,          session.advisor};
   for (const data::TrialRecord& record : session.completed) participant->learn_from(record);
@@ -468,12 +520,8 @@ std::vector<std::string> simulation_faults(const protocols::Protocol& protocol,
     faults.emplace_back(
         "another program chooses the stimuli of the task 'external': palpate serve runs it");
   }
-  if (protocols::study_of_shapes(protocol)) {
-    for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
-      const std::string fault = participants::ShapeHypotheses::fault_of(stimulus.object);
-      if (!fault.empty()) faults.push_back("stimulus '" + stimulus.name + "': " + fault);
-    }
-  }
+  const std::vector<std::string> own = kind_of(protocol).faults(protocol);
+  faults.insert(faults.end(), own.begin(), own.end());
   try {  // patched settings may be invalid
     const participants::ShapeHypotheses hypotheses({stimuli::ObjectSpec{}});
     participants::SimulatedParticipant(participants::individual(settings, 0, 1), hypotheses, device,

@@ -10,7 +10,7 @@
 #include "protocols/protocol.h"
 #include "runner/devices/registry.h"
 #include "runner/display/window.h"
-#include "runner/participants/keyboard.h"
+#include "runner/participants/response_box.h"
 #include "runner/safety/guarded_device.h"
 #include "runner/scene_builder.h"
 #include "runner/servo/servo_thread.h"

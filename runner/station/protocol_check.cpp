@@ -8,7 +8,7 @@
 
 #include "data/base/cell_name.h"
 #include "protocols/factors.h"
-#include "protocols/schedule.h"
+#include "protocols/session_plan.h"
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/levels.h"
 #include "runner/devices/registry.h"
@@ -18,6 +18,7 @@
 #include "runner/session/simulated_study.h"
 #include "runner/sound/sound_output.h"
 #include "runner/sound/sound_source.h"
+#include "runner/study/study_order.h"
 
 namespace palpate::runner::station {
 namespace {
@@ -133,16 +134,9 @@ Json summary_json(const protocols::Protocol& protocol) {
     for (const protocols::FactorLevel& level : factor.levels)
       out["factors"][factor.name].push_back(level.name);
   }
-  long long trials = 0;
-  if (protocols::study_of_shapes(protocol)) {
-    trials = protocols::main_trials(protocol);
-  } else {
-    for (const protocols::TaskBlock& block : protocol.blocks) {
-      out["blocks"].push_back(block_json(protocol, block));
-      if (!block.practice) trials += protocols::expected_trials_of(block);
-    }
-  }
-  out["trials"] = trials;
+  for (const protocols::TaskBlock* const block : protocols::listed_blocks(protocol))
+    out["blocks"].push_back(block_json(protocol, *block));
+  out["trials"] = study::planned_trials(protocol);
   if (protocol.groups.any()) {
     const GroupAssignment groups = protocol.groups.unmasked();
     out["groups"] = {{"names", groups.names}, {"assign", to_string(groups.rule)}};
@@ -262,22 +256,17 @@ std::vector<GroupedReason> grouped(const std::vector<std::string>& reasons,
 
 Duration duration_of(const protocols::Protocol& protocol) {
   Duration out;
-  if (protocols::study_of_shapes(protocol)) {
-    const auto n = static_cast<double>(protocols::schedule(protocol, 1).size());
-    const double time_out = protocol.blocks.front().time_out;
-    out.usual = n * (std::min(kToIdentify, time_out) + protocol.home.rest);
-    out.longest = n * (time_out + protocol.home.rest);
-    return out;
-  }
-  for (const protocols::TaskBlock& block : protocol.blocks) {
+  const std::vector<protocols::TrialCounts> counts = protocols::trial_counts(protocol);
+  for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
+    const protocols::TaskBlock& block = protocol.blocks[i];
     const double felt = felt_in_trial(block), pauses = (felt - 1) * block.inter_interval;
-    const double one = std::min(seconds_of(block), block.interval_limit.value_or(HUGE_VAL));
+    const double limit = protocols::is_study_of_shapes(protocol) ? block.time_out : HUGE_VAL;
+    const double one = std::min(seconds_of(block), block.interval_limit.value_or(limit));
     const double rests = felt * protocol.home.rest + pauses;
     // The limit of the answer counts from the begin of the last interval.
     const double before = (felt - 1) * block.interval_limit.value_or(block.time_out);
-    out.usual += static_cast<double>(protocols::expected_trials_of(block)) * (felt * one + rests);
-    out.longest +=
-        static_cast<double>(protocols::most_trials_of(block)) * (before + block.time_out + rests);
+    out.usual += static_cast<double>(counts[i].expected) * (felt * one + rests);
+    out.longest += static_cast<double>(counts[i].most) * (before + block.time_out + rests);
   }
   return out;
 }

@@ -270,7 +270,7 @@ int comparison_interval(const protocols::TaskBlock& block, const protocols::Tria
 
 std::string schedule_text(const protocols::Protocol& protocol, int participant,
                           const std::string& format) {
-  const Listing& listing = protocols::study_of_shapes(protocol) ? kOfShapes : kOfBlocks;
+  const Listing& listing = protocols::is_study_of_shapes(protocol) ? kOfShapes : kOfBlocks;
   const std::vector<protocols::Trial> trials = listing.trials(protocol, participant);
   if (format == "table") return listing.table(protocol, trials);
   if (format == "csv") return listing.csv(protocol, participant, trials);

@@ -31,21 +31,14 @@ std::string turn_text(const Quat& q) {
 
 OrderRow row_of(const Protocol& protocol, const protocols::Trial& trial) {
   const Quat& q = trial.orientation;
-  OrderRow row{trial.session,
-               protocols::to_string(trial.renderer),
-               protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name,
-               {q.w, q.x, q.y, q.z}};
   const TaskBlock& block = protocols::block_of(protocol, trial);
-  if (!block.name.empty())
-    row.task = {trial.block,
-                block.name,
-                trial.track,
-                trial.level,
-                trial.catch_trial,
-                comparison_interval(block, trial),
-                block.reaching ? protocols::to_string(trial.reach) : "",
-                trial.point};
-  return row;
+  return {trial.session,
+          protocols::to_string(trial.renderer),
+          protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name,
+          {q.w, q.x, q.y, q.z},
+          compared({trial.block, block.name, trial.track, trial.level, trial.catch_trial,
+                    comparison_interval(block, trial),
+                    block.reaching ? protocols::to_string(trial.reach) : "", trial.point})};
 }
 
 /// The order of the cells in tracks that they share.
@@ -128,11 +121,15 @@ bool is_level_asked(const protocols::SessionPlan& plan) {
 
 }  // namespace
 
+OrderRow::Task compared(OrderRow::Task task) {
+  return task.name.empty() ? OrderRow::Task() : std::move(task);
+}
+
 std::string to_line(const OrderRow& row) {
   std::string line = std::to_string(row.session) + "," + row.renderer + "," + row.shape;
   for (const double part : row.orientation_wxyz) line += "," + digits_of(part);
-  if (!row.task) return line;
-  const OrderRow::Task& task = *row.task;
+  const OrderRow::Task& task = row.task;
+  if (task.name.empty()) return line;
   line += "," + std::to_string(task.block) + "," + task.name + "," + std::to_string(task.track) +
           "," + (task.level ? digits_of(*task.level) : "") + (task.catch_trial ? ",1," : ",0,") +
           std::to_string(task.comparison) + (task.reach.empty() ? "" : "," + task.reach);
@@ -163,17 +160,16 @@ ExpectedTrials expected_trials(const Protocol& all, int participant_number,
     int last_block = 0;
     for (const ShownTrial& one : shown) {
       if (one.row.session != session || plan.finished()) continue;
-      if (one.row.task) last_block = one.row.task->block;
+      last_block = one.row.task.block;
       // A program may end the blocks that it chooses the levels for.
-      while (one.row.task && !plan.finished() && is_level_asked(plan) &&
-             plan.next().block < one.row.task->block)
+      while (!plan.finished() && is_level_asked(plan) && plan.next().block < one.row.task.block)
         plan.end_block();
       if (plan.finished()) continue;
       if (!plan.next().practice) {
         out.rows.push_back(row_of(protocol, plan.next()));
-        if (one.row.task && is_level_asked(plan)) {
-          out.rows.back().task->level = one.row.task->level;
-          out.rows.back().task->point = one.row.task->point;
+        if (is_level_asked(plan)) {
+          out.rows.back().task.level = one.row.task.level;
+          out.rows.back().task.point = one.row.task.point;
         }
       }
       protocols::TrialOutcome outcome = one.outcome;
@@ -202,30 +198,16 @@ bool has_adaptive_blocks(const Protocol& protocol) {
   });
 }
 
-std::string conditions_in_words(const Protocol& protocol) {
-  return protocols::study_of_shapes(protocol) ? "renderers" : "blocks";
-}
-
 std::string condition_order(const Protocol& all, int participant_number) {
   const Protocol& protocol = protocols::protocol_of(all, participant_number);
-  std::vector<std::string> names;
-  if (protocols::study_of_shapes(protocol)) {
-    for (const protocols::Trial& trial : protocols::schedule(protocol, participant_number))
-      names.emplace_back(protocols::to_string(trial.renderer));
-  }
-  for (int session = 1; session <= protocol.sessions.count; ++session) {
-    for (const int index : protocols::blocks_in_order(protocol, participant_number, session)) {
-      const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(index)];
-      if (!block.practice && !block.name.empty()) names.push_back(block.name);
-    }
-  }
-  return joined_in_order(names);
+  return joined_in_order(protocol.order_rule->conditions(protocol, participant_number));
 }
 
-std::string condition_order(const std::vector<ShownTrial>& shown) {
+std::string condition_order(const Protocol& protocol, const std::vector<ShownTrial>& shown) {
   std::vector<std::string> names;
   for (const ShownTrial& one : shown) {
-    if (!one.practice) names.push_back(one.row.task ? one.row.task->name : one.row.renderer);
+    if (one.practice) continue;
+    names.push_back(protocol.order_rule->condition_of(one.row.renderer, one.row.task.name));
   }
   return joined_in_order(names);
 }

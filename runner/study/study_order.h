@@ -19,10 +19,10 @@ struct OrderRow {
   int session = 1;
   std::string renderer, shape;
   std::array<double, 4> orientation_wxyz{};
-  /// Of a block of tasks.
+  /// As default in the study of shapes, whose order is that of renderers and shapes alone.
   struct Task {
     int block = 1;     ///< number
-    std::string name;  ///< of the block
+    std::string name;  ///< of the block; "": of the study of shapes
     int track = 1;
     std::optional<double> level;  ///< none: nothing is varied, or a catch trial
     bool catch_trial = false;
@@ -31,7 +31,7 @@ struct OrderRow {
     std::vector<double> point = {};  ///< of several dimensions, in place of `level`
     bool operator==(const Task&) const = default;
   };
-  std::optional<Task> task = std::nullopt;
+  Task task = {};
   bool operator==(const OrderRow&) const = default;
 };
 
@@ -41,6 +41,9 @@ struct ShownTrial {
   bool practice = false;
   protocols::TrialOutcome outcome = {};
 };
+
+/// The task of a trial, as it is compared: of a block without a name the default.
+OrderRow::Task compared(OrderRow::Task task);
 
 /// "session,renderer,shape,w,x,y,z" with 17 significant digits; of tasks followed by
 /// ",block,name,track,level,catch,comparison", of a movement to a target also ",field", of a level
@@ -71,11 +74,10 @@ std::size_t planned_trials(const protocols::Protocol& protocol);
 /// Whether answers choose levels of trials for analysis.
 bool has_adaptive_blocks(const protocols::Protocol& protocol);
 
-/// "renderers" or "blocks": of which the order differs over participants.
-std::string conditions_in_words(const protocols::Protocol& protocol);
-/// The order in which they come: "point, then ray".
+/// The order in which renderers or blocks come: "point, then ray".
 std::string condition_order(const protocols::Protocol& protocol, int participant_number);
 /// The same of trials that were shown.
-std::string condition_order(const std::vector<ShownTrial>& shown);
+std::string condition_order(const protocols::Protocol& protocol,
+                            const std::vector<ShownTrial>& shown);
 
 }  // namespace palpate::runner::study

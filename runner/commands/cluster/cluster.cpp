@@ -33,7 +33,7 @@
 #include "runner/commands/plan/plan.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/study_options.h"
-#include "runner/commands/sweep/planned.h"
+#include "runner/commands/sweep/sweep_options.h"
 #include "runner/output/outputs.h"
 #include "runner/session/run_record.h"
 #include "runner/study/simulation_limits.h"
@@ -278,8 +278,8 @@ double stimuli_felt(const protocols::Protocol& protocol) {
   return felt;
 }
 
-int begin_sweep(const ClusterSettings& settings, const SweepSettings& sweep) {
-  const PlannedSweep planned(sweep);
+int begin_sweep(const ClusterSettings& settings, const sweep::SweepSettings& sweep) {
+  const sweep::PlannedSweep planned(sweep, std::cerr);
   const auto command = [&](const std::vector<std::string>& inputs) {
     std::string out = "sweep " + shell_quoted(inputs[0]) + " --space " + shell_quoted(inputs[1]) +
                       " --points " + std::to_string(sweep.points) + " --design " + sweep.design +
@@ -464,7 +464,7 @@ int cluster_command(const std::vector<std::string>& args) {
   }
   const bool named = !what.empty() && what.front() != '-';
   const std::vector<std::string> words(args.begin() + (named ? 1 : 0), args.end());
-  SweepSettings sweep;
+  sweep::SweepSettings sweep;
   StudyOptions study;
   PlanOptions plan;
   add_options(line, settings);

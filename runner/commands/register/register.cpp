@@ -27,6 +27,7 @@
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "protocols/protocol.h"
+#include "protocols/session_plan.h"
 #include "protocols/tasks/block_order.h"
 #include "runner/build_info.h"
 #include "runner/commands/shared/command.h"
@@ -40,6 +41,7 @@
 #include "runner/registration/registration_text.h"
 #include "runner/registration/sealed_folder.h"
 #include "runner/session/run_record.h"
+#include "runner/session/simulated_study.h"
 #include "runner/study/study_order.h"
 
 namespace palpate::runner::commands {
@@ -267,8 +269,9 @@ std::vector<std::string> warnings_of(const registration::Registration& made) {
   }
   const auto orders = static_cast<std::size_t>(protocols::block_orders(made.protocol));
   if (made.participants % orders != 0)
-    out.push_back(std::string("The orders of the ") + study::conditions_in_words(made.protocol) +
-                  " repeat after " + std::to_string(orders) + " participants: with " +
+    out.push_back(std::string("The orders of the ") +
+                  made.protocol.order_rule->conditions_in_words() + " repeat after " +
+                  std::to_string(orders) + " participants: with " +
                   std::to_string(made.participants) + " they are not balanced.");
   if (!made.plan.pilot_label.empty())
     out.push_back("The plan rests on " + made.plan.pilot_label +
@@ -292,15 +295,15 @@ void put_simulated(const RegisterOptions& options, const data::AtomicFolder& dra
                    registration::Registration& made) {
   constexpr const char* kEffect = "simulated/planned-effect.csv";
   constexpr const char* kNone = "simulated/no-effect.csv";
-  const std::unique_ptr<registration::PlannedStudies> studies = registration::planned_studies(made);
+  const std::unique_ptr<registration::StudyAnswers> answers = registration::study_answers(made);
+  const std::unique_ptr<registration::PlannedStudies> studies = answers->planned();
   const std::string scratch = draft / "scratch";
   studies->write(scratch, draft.prepare(kEffect), draft / "codebook.csv", true);
   fs::remove_all(scratch);
   studies->write(scratch, draft.prepare(kNone), "", false);
   fs::remove_all(scratch);
-  registration::write_member(
-      draft, "simulated/README.md",
-      "# SIMULATED data\n\n" + registration::study_answers(made)->simulated() + "\n");
+  registration::write_member(draft, "simulated/README.md",
+                             "# SIMULATED data\n\n" + answers->simulated() + "\n");
   const std::string with = studies->analyzed(draft / kEffect, kEffect);
   const std::string none = studies->analyzed(draft / kNone, kNone);
   registration::write_member(draft, "analysis-simulated.json",

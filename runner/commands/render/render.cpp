@@ -1,27 +1,19 @@
-#include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <iostream>
-#include <limits>
-#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
-#include <set>
-#include <sstream>
 #include <string>
 #include <vector>
 
 #include "data/base/text.h"
 #include "protocols/parse.h"
-#include "rendering/bodies/moving_scene.h"
-#include "rendering/bodies/soft/soft_scene.h"
 #include "runner/commands/shared/command.h"
 #include "runner/evidence/scenes/feature_costs.h"
+#include "runner/evidence/scenes/stage_costs.h"
 #include "runner/evidence/verification/explain.h"
 #include "runner/output/outputs.h"
 #include "runner/touch/forces.h"
 #include "runner/touch/scene_notes.h"
-#include "stimuli/convex_mesh.h"
 #include "stimuli/parts/convex_parts.h"
 
 namespace palpate::runner::commands {
@@ -29,63 +21,14 @@ namespace {
 
 namespace po = boost::program_options;
 
-// `palpate render --explain`: the stages of a tick over a scene, and their costs.
-
-/// A stage with its cost on this machine.
-struct StageCost {
-  evidence::TickStage stage;
-  /// ns for a call, run in isolation over recorded ticks; empty: left out, did not happen, or
-  /// cannot be separated from others.
-  std::optional<double> ns;
-};
-
-struct Explanation {
-  std::string renderer;
-  std::size_t objects = 0, parts = 0, surfaces = 0, facets = 0, edges = 0;
-  std::optional<double> contact_ns, free_ns;  ///< of a whole tick
-  std::optional<double> rest_ns;              ///< of contact_ns: not accounted for by the stages
-  std::vector<StageCost> stages;
-  std::vector<std::string> notes = {};               ///< on the scene, a sentence each
-  std::vector<evidence::FeatureTime> features = {};  ///< that the scene has
-  std::vector<evidence::FeatureSaved> saved = {};    ///< that it does not need
-};
-
-/// ns for a call: the least of several runs, each long enough for the clock.
-double cost_of(const evidence::StageTiming& timing) {
-  constexpr int kRuns = 15;
-  constexpr std::chrono::milliseconds kLong{1};
-  volatile double sink = 0;
-  double least = std::numeric_limits<double>::infinity();
-  for (int i = 0; i < kRuns; ++i) {
-    std::chrono::steady_clock::duration passed{};
-    std::size_t calls = 0;
-    while (passed < kLong) {
-      timing.prepare();
-      const auto start = std::chrono::steady_clock::now();
-      sink = sink + timing.run();
-      passed += std::chrono::steady_clock::now() - start;
-      calls += timing.calls;
-    }
-    const std::chrono::duration<double, std::nano> ns = passed;
-    least = std::min(least, ns.count() / static_cast<double>(calls));
-  }
-  return least;
-}
+using evidence::Explanation;
+using evidence::StageCost;
 
 std::string nanoseconds(const std::optional<double>& ns) {
   if (!ns) return "-";
   char text[32];
   std::snprintf(text, sizeof text, "%.1f", *ns);
   return text;
-}
-
-/// Fraction of the whole tick in contact, where the stage is part of it.
-std::optional<double> share_of_contact(const Explanation& e, const StageCost& cost) {
-  if (!cost.ns || !e.contact_ns) return std::nullopt;
-  if (cost.stage.time != evidence::StageTime::tick &&
-      cost.stage.time != evidence::StageTime::contact)
-    return std::nullopt;
-  return *cost.ns / *e.contact_ns;
 }
 
 std::string percent(const std::optional<double>& value) {
@@ -97,91 +40,6 @@ std::string percent(const std::optional<double>& value) {
 
 void pad(std::string& line, std::size_t column) {
   line.append(line.size() < column ? column - line.size() : 1, ' ');
-}
-
-StageCost soft_stage(const rendering::SoftObject& object) {
-  const rendering::SoftBody& body = *object.body;
-  const auto& mesh = body.mesh();
-  char text[200];
-  std::snprintf(text, sizeof text,
-                "object %d: %zu nodes, %zu elements, %g steps a second; between them the surface "
-                "gives by its compliance",
-                object.object, mesh.nodes.size(), mesh.hexahedra.size() + mesh.tetrahedra.size(),
-                1 / body.settings().step);
-  return {{"soft body", evidence::StageTime::tick, true, text}, std::nullopt};
-}
-
-/// The cost of bodies beside the contact law, with all of them in motion and the probe far away.
-StageCost bodies_stage(const rendering::Scene& scene, const rendering::Renderer& renderer,
-                       const rendering::MovingSummary& moving) {
-  constexpr int kTicks = 500;
-  const auto now = [] { return std::chrono::steady_clock::now(); };
-  rendering::RenderState state = scene.initial_state();
-  const rendering::LineProbe far{Vec3(1e3), Vec3(1e3) + Vec3(0, 0, 0.12)};
-  const auto began = now();
-  for (int i = 0; i < kTicks; ++i) renderer.tick(scene, state, far, 1e-3);
-  const std::chrono::duration<double, std::nano> took = now() - began;
-  std::ostringstream text;
-  text.precision(3);
-  text << moving.bodies << (moving.bodies == 1 ? " object moves" : " objects move") << " ("
-       << moving.lightest << " to " << moving.heaviest << " kg), " << moving.obstacles
-       << " stand still; " << moving.part_pairs << " pairs of convex parts may meet; "
-       << 1e-3 * took.count() / kTicks
-       << " us a tick over the first half second without the probe; what rests sleeps";
-  return {{"moving bodies", evidence::StageTime::tick, true, text.str()}, std::nullopt};
-}
-
-Explanation explain_with_costs(const rendering::Scene& scene, const rendering::Renderer& renderer) {
-  Explanation explanation;
-  explanation.renderer = renderer.name();
-  explanation.parts = scene.parts().size();
-  std::set<int> objects;
-  for (const rendering::ScenePart& part : scene.parts()) {
-    objects.insert(part.object);
-    explanation.facets += part.mesh->facets().size();
-    explanation.edges += part.mesh->edges().size();
-  }
-  explanation.surfaces = scene.surfaces().size();
-  for (const rendering::PlacedSurface& placed : scene.surfaces()) {
-    objects.insert(placed.of_shell.begin(), placed.of_shell.end());
-    explanation.facets += placed.surface->triangles().size();
-    explanation.edges += placed.surface->triangles().size() / 2 * 3;
-  }
-  explanation.objects = objects.size();
-  std::map<std::string, double> costs;
-  const auto soft = rendering::soft_objects(scene);
-  if (soft.empty()) {  // else the stages are a scene's within, whose parts are not the ones shown
-    for (const evidence::StageTiming& timing : evidence::stage_timings(scene, renderer)) {
-      if (timing.calls > 0) costs[timing.name] = cost_of(timing);
-    }
-  }
-  const auto cost = [&](const std::string& name) -> std::optional<double> {
-    const auto found = costs.find(name);
-    if (found == costs.end()) return std::nullopt;
-    return found->second;
-  };
-  explanation.contact_ns = cost(evidence::kTickInContact);
-  explanation.free_ns = cost(evidence::kTickInFreeSpace);
-  if (!explanation.contact_ns) {
-    // Made of closed surfaces, or soft.
-    const evidence::WholeTick whole = evidence::time_whole_tick(scene, renderer);
-    explanation.contact_ns = whole.contact_ns;
-    explanation.free_ns = whole.free_ns;
-  }
-  explanation.saved = evidence::features_saved(scene, renderer);
-  for (evidence::TickStage& stage : evidence::explain(scene, renderer)) {
-    StageCost with{std::move(stage), std::nullopt};
-    if (with.stage.runs) with.ns = cost(with.stage.name);
-    explanation.stages.push_back(std::move(with));
-  }
-  if (const auto moving = rendering::moving_summary(scene))
-    explanation.stages.push_back(bodies_stage(scene, renderer, *moving));
-  for (const auto& object : soft) explanation.stages.push_back(soft_stage(*object));
-  explanation.rest_ns = explanation.contact_ns;
-  for (const StageCost& c : explanation.stages) {
-    if (share_of_contact(explanation, c)) *explanation.rest_ns -= *c.ns;
-  }
-  return explanation;
 }
 
 /// What its features cost, and what those that it does not need would.
@@ -226,7 +84,7 @@ std::string to_text(const Explanation& e) {
     std::string line = c.stage.name;
     pad(line, 25);
     line += c.stage.runs ? evidence::to_string(c.stage.time) : "left out";
-    const std::string ns = nanoseconds(c.ns), part = percent(share_of_contact(e, c));
+    const std::string ns = nanoseconds(c.ns), part = percent(evidence::share_of_contact(e, c));
     pad(line, 49 - ns.size());
     line += ns;
     pad(line, 56 - part.size());
@@ -308,7 +166,7 @@ void explain_scene(output::Outputs& outputs, const std::string& path,
                    const protocols::SceneSpec& spec, const rendering::Renderer& renderer) {
   SceneBuilder builder;
   const rendering::Scene scene = touch::build_scene(builder, path, spec, renderer);
-  Explanation explanation = explain_with_costs(scene, renderer);
+  Explanation explanation = evidence::explain_with_costs(scene, renderer);
   explanation.features = evidence::feature_times(path, spec, renderer);
   for (std::size_t i = 0; i < spec.objects.size(); ++i) {
     if (!spec.objects[i].soft)

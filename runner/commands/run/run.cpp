@@ -23,6 +23,8 @@
 #include "protocols/tasks/texts.h"
 #include "runner/commands/run/settings.h"
 #include "runner/commands/shared/command.h"
+#include "runner/participants/keyboard.h"
+#include "runner/participants/response_box.h"
 #include "runner/safety/fault_signals.h"
 #include "runner/session/device_check.h"
 #include "runner/session/live_session.h"

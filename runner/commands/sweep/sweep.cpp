@@ -22,10 +22,47 @@
 #include "data/store/sweep_file.h"
 #include "runner/commands/shared/command.h"
 #include "runner/commands/shared/study_options.h"
-#include "runner/commands/sweep/planned.h"
+#include "runner/commands/sweep/sweep_options.h"
 #include "runner/output/progress_line.h"
+#include "runner/study/simulation_limits.h"
 
 namespace palpate::runner::commands {
+
+namespace po = boost::program_options;
+
+void add_sweep_options(CommandLine& line, sweep::SweepSettings& settings) {
+  line.options.add_options()  //
+      ("space", po::value(&settings.space)->required()->value_name("FILE"),
+       "what varies, and how (JSON)")  //
+      ("points", po::value(&settings.points)->required()->value_name("N"),
+       "number of studies; grid and saltelli round down to a possible number")  //
+      ("design",
+       po::value(&settings.design)->default_value("lhs")->value_name("lhs|sobol|grid|saltelli"),
+       "how the points lie: Latin hypercube, Sobol's sequence, all combinations, or Saltelli's "
+       "samples for Sobol indices")  //
+      ("seed", po::value(&settings.seed)->default_value(settings.seed)->value_name("S"),
+       "of the design and, with its number, of every point")  //
+      ("participants",
+       po::value(&settings.participants)->default_value(settings.participants)->value_name("N"),
+       "simulated participants at each point")  //
+      ("repetitions", po::value(&settings.repetitions)->value_name("R"),
+       "of each shape with each renderer, instead of the protocol's");
+  add_participant_version(line, settings.version);
+  line.options.add_options()  //
+      ("settings", po::value(&settings.patch)->value_name("FILE"),
+       "JSON merge patch on those settings, before anything varies");
+}
+
+void check_sweep_options(const po::variables_map& values, sweep::SweepSettings& settings) {
+  constexpr std::int64_t kMostPoints = 100'000'000;
+  if (settings.points < 1 || settings.points > kMostPoints)
+    throw UsageError("--points: must be 1 to " + std::to_string(kMostPoints));
+  study::check_simulated_participants(settings.participants);
+  if (values.count("repetitions") && (settings.repetitions < 1 || settings.repetitions > 1000000))
+    throw UsageError("--repetitions: must be 1 to 1000000");
+  check_participant_version(values, settings.version);
+  settings.protocol = values["PROTOCOL.json"].as<std::string>();
+}
 
 std::string analyze_sweep_file(const std::string& file, const std::string& pattern,
                                output::Outputs& outputs) {
@@ -52,11 +89,12 @@ std::string analyze_sweep_file(const std::string& file, const std::string& patte
 
 namespace {
 
-namespace po = boost::program_options;
 using nlohmann::json;
+using sweep::PlannedSweep;
+using sweep::Sweep;
 
 struct RunSettings {
-  SweepSettings sweep;
+  sweep::SweepSettings sweep;
   std::string database, shard;
   std::int64_t print_point = 0;  ///< 0: none, the sweep runs
   int jobs = 1;
@@ -273,7 +311,7 @@ int sweep_command(const std::vector<std::string>& args) {
       parse_shard(settings->shard, [](const char* name) { return std::getenv(name); });
   if (settings->sweep.version == 0)
     settings->sweep.version = version_begun_with(settings->database);
-  const PlannedSweep planned(settings->sweep);
+  const PlannedSweep planned(settings->sweep, std::cerr);
   const Sweep sweep{planned.study, planned.design, planned.plan};
   if (settings->print_point > 0) {
     print_point(sweep, settings->print_point);

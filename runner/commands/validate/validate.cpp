@@ -13,6 +13,7 @@
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "protocols/schedule.h"
+#include "protocols/session_plan.h"
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/texts.h"
 #include "runner/commands/shared/command.h"
@@ -120,7 +121,7 @@ void print_task_summary(const protocols::Protocol& protocol, std::ostream& out) 
 }
 
 void print_summary(const protocols::Protocol& protocol, std::ostream& out) {
-  if (protocol.version == 2) return print_task_summary(protocol, out);
+  if (!protocols::is_study_of_shapes(protocol)) return print_task_summary(protocol, out);
   const std::vector<protocols::Trial> trials = protocols::schedule(protocol, 1);
   const long long counted = protocols::main_trials(protocol);
   const int sessions = protocol.sessions.count;

@@ -217,5 +217,31 @@ TEST(SessionPlan, StartsAdjustmentsInTurn) {
   EXPECT_EQ(two, (std::vector<double>{550, 150, 550, 150}));
 }
 
+TEST(TrialCounts, EqualTheTrialsOfTheSessions) {
+  const Protocol tasks = parsed(task_study());
+  const std::vector<TrialCounts> counts = trial_counts(tasks);
+  ASSERT_EQ(counts.size(), tasks.blocks.size());
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    EXPECT_EQ(counts[i].expected, expected_trials_of(tasks.blocks[i]));
+    EXPECT_EQ(counts[i].most, most_trials_of(tasks.blocks[i]));
+  }
+  const Protocol shapes = parse_protocol(PALPATE_SOURCE_DIR "/protocols/ho2000.json");
+  const std::vector<TrialCounts> of_shapes = trial_counts(shapes);
+  ASSERT_EQ(of_shapes.size(), 1U);
+  EXPECT_EQ(of_shapes[0].expected, static_cast<long long>(schedule(shapes, 1).size()));
+}
+
+TEST(OrderRule, NamesWhatComesInOrder) {
+  const Protocol tasks = parsed(task_study());
+  const std::vector<std::string> blocks = tasks.order_rule->conditions(tasks, 1);
+  for (const TaskBlock* const block : listed_blocks(tasks))
+    EXPECT_EQ(std::ranges::count(blocks, block->name), block->practice ? 0 : 1);
+  const Protocol shapes = parse_protocol(PALPATE_SOURCE_DIR "/protocols/ho2000.json");
+  EXPECT_TRUE(listed_blocks(shapes).empty());
+  EXPECT_EQ(shapes.order_rule->conditions(shapes, 1).front(),
+            to_string(schedule(shapes, 1).front().renderer));
+  EXPECT_EQ(shapes.order_rule->condition_of("ray", ""), "ray");
+}
+
 }  // namespace
 }  // namespace palpate::protocols

@@ -1,5 +1,7 @@
 // A response box at the other end of a pseudo-terminal.
 
+#include "runner/participants/response_box.h"
+
 #include <fcntl.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
@@ -10,7 +12,6 @@
 #include <stdexcept>
 #include <thread>
 
-#include "runner/participants/keyboard.h"
 #include "runner/servo/realtime.h"
 #include "tests/shared/temporary_folder.h"
 

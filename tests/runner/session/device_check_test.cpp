@@ -37,6 +37,7 @@ protocols::Protocol some_protocol(const stimuli::Material& material) {
   stimulus.object.material = material;
   protocol.stimuli = {stimulus};
   protocol.blocks = {protocols::shapes_block(protocol)};
+  protocol.materials_vary = false;
   return protocol;
 }
 

@@ -1,19 +1,18 @@
 #pragma once
-// The request for a sweep: the options that determine its results, checked, and its plan.
+// A sweep as it was asked for: its plan, and its points.
 
 #include <atomic>
 #include <cstdint>
 #include <optional>
+#include <ostream>
 #include <string>
 
 #include "data/sweep_record.h"
 #include "protocols/protocol.h"
-#include "runner/commands/shared/command.h"
-#include "runner/output/outputs.h"
 #include "runner/sweep/design.h"
 #include "runner/sweep/swept_study.h"
 
-namespace palpate::runner::commands {
+namespace palpate::runner::sweep {
 
 struct SweepSettings {
   std::string protocol, space, design;
@@ -24,19 +23,15 @@ struct SweepSettings {
   int participants = 7, repetitions = 0;  ///< repetitions 0: the protocol's
 };
 
-void add_sweep_options(CommandLine& line, SweepSettings& settings);
-/// Call it with the result of CommandLine::parse. \throws UsageError
-void check_sweep_options(const boost::program_options::variables_map& values,
-                         SweepSettings& settings);
-
 struct PlannedSweep {
   /// \param settings  with a version. \throws UsageError; protocols::InputError with every fault of
   /// protocol or space
-  explicit PlannedSweep(const SweepSettings& settings);
+  /// \param notes  gets a line for each setting that could not be kept
+  PlannedSweep(const SweepSettings& settings, std::ostream& notes);
 
   protocols::Protocol protocol;  ///< as in its file
-  sweep::SweptStudy study;
-  sweep::Design design;
+  SweptStudy study;
+  Design design;
   data::SweepPlan plan;
 };
 
@@ -44,21 +39,16 @@ struct PlannedSweep {
 
 /// The inputs of a point.
 struct Sweep {
-  const sweep::SweptStudy& study;
-  const sweep::Design& design;
+  const SweptStudy& study;
+  const Design& design;
   const data::SweepPlan& plan;
 };
 
 /// The point's study, not yet run.
-sweep::PointStudy study_of_point(const Sweep& sweep, std::int64_t point);
+PointStudy study_of_point(const Sweep& sweep, std::int64_t point);
 
 /// Runs a point. An exception is the reason why the point failed. \return none: it was stopped
 std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
                                         const std::atomic<bool>& stop);
 
-/// `palpate analyze --sweep`: the analysis as text; puts the requested files into `outputs` without
-/// writing them. \throws UsageError: the file is not a sweep's, or the pattern is invalid
-std::string analyze_sweep_file(const std::string& file, const std::string& pattern,
-                               output::Outputs& outputs);
-
-}  // namespace palpate::runner::commands
+}  // namespace palpate::runner::sweep
