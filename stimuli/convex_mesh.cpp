@@ -33,7 +33,7 @@ struct Bulk {
   double volume = 0, area = 0;  // m^3, negative where it is inside out; m^2
 };
 
-Bulk bulk_of(const HalfEdges& mesh, const std::vector<FaceShape>& shapes) {
+Bulk bulk_within(const HalfEdges& mesh, const std::vector<FaceShape>& shapes) {
   Bulk bulk;
   for (const FaceShape& shape : shapes) {
     bulk.volume += glm::dot(shape.middle - mesh.points[0], shape.normal) * shape.area / 3;
@@ -45,7 +45,7 @@ Bulk bulk_of(const HalfEdges& mesh, const std::vector<FaceShape>& shapes) {
 // Convex edges, volume and orientation, before any faces are merged.
 void check_solid(const HalfEdges& mesh, const std::vector<FaceShape>& shapes, MeshFaults& faults) {
   check_flatness(mesh, shapes, faults);
-  const auto [volume, area] = bulk_of(mesh, shapes);
+  const auto [volume, area] = bulk_within(mesh, shapes);
   const bool closed =
       std::find(mesh.twin.begin(), mesh.twin.end(), HalfEdges::kNone) == mesh.twin.end();
   if (closed && !(std::abs(volume) > 2 * mesh.error * area)) {
@@ -591,7 +591,7 @@ bool ConvexMesh::Builder::fill(ConvexMesh& out, const HalfEdges& mesh,
 bool ConvexMesh::Builder::fill_from_hull(ConvexMesh& out, const HalfEdges& mesh,
                                          const std::vector<FaceShape>& shapes) {
   // A surface that winds round twice has the corners of its hull and convex edges: volumes differ.
-  const Bulk is = bulk_of(mesh, shapes);
+  const Bulk is = bulk_within(mesh, shapes);
   const double most = kDeepest * mesh.error * is.area;
   if (least_hull_volume(mesh.points) - is.volume > 2 * most) return false;
   const GridHull hull = grid_hull(mesh.points, mesh.error);
@@ -600,7 +600,7 @@ bool ConvexMesh::Builder::fill_from_hull(ConvexMesh& out, const HalfEdges& mesh,
   const HalfEdges hull_mesh = link_half_edges(hull.soup, hull_faults);
   if (!hull_faults.empty()) return false;
   const std::vector<FaceShape> hull_shapes = shapes_of(hull_mesh);
-  if (std::abs(bulk_of(hull_mesh, hull_shapes).volume - is.volume) > most) return false;
+  if (std::abs(bulk_within(hull_mesh, hull_shapes).volume - is.volume) > most) return false;
   Index count = 0;
   const std::vector<Index> merged = coplanar_regions(hull_mesh, hull_shapes, count);
   if (fill(out, hull_mesh, merged, count, hull_faults) && hull_faults.empty()) return true;

@@ -588,6 +588,12 @@ double BodyContacts::time_to_next(double most) {
   return next;
 }
 
+/// m/s, at most, of any point against any other by the turn of both.
+double BodyContacts::turning_of(const BodyPair& pair) const {
+  return glm::length(state_.spin[pair.a]) * world_.bodies[pair.a].radius +
+         (pair.obstacle ? 0 : glm::length(state_.spin[pair.b]) * world_.bodies[pair.b].radius);
+}
+
 /// The gap of two parts after a time of free motion.
 Gap BodyContacts::gap_after(const BodyWorldState::NearParts& near, double time, double enough,
                             GapMemory& memory, Vec3& closing) const {
@@ -603,11 +609,12 @@ Gap BodyContacts::gap_after(const BodyWorldState::NearParts& near, double time, 
   closing = a.velocity - b.velocity;
   if (pair.by_surface) {
     constexpr double kFarthest = 1e-2;  // m
+    GapLimits limits{.reach = std::min(enough, kFarthest)};
+    limits.depth += time * (glm::length(closing) + turning_of(pair));
     Gap gap;
     gap.distance = gap_between(
         place_of(*world_.bodies[pair.a].surface, {a.centre, a.orientation}),
-        place_of(surface_b(pair), pair.obstacle ? Pose{} : Pose{b.centre, b.orientation}),
-        std::min(enough, kFarthest));
+        place_of(surface_b(pair), pair.obstacle ? Pose{} : Pose{b.centre, b.orientation}), limits);
     return gap;
   }
   return gap_between(place_of(world_.bodies[pair.a].parts[parts.part_a], {a.centre, a.orientation}),
@@ -621,9 +628,7 @@ Gap BodyContacts::gap_after(const BodyWorldState::NearParts& near, double time, 
 double BodyContacts::meeting_time(const BodyWorldState::NearParts& near, double most) {
   constexpr int kMostAdvances = 6;
   const BodyPair& pair = world_.pairs[near.pair];
-  const double turning =
-      glm::length(state_.spin[pair.a]) * world_.bodies[pair.a].radius +
-      (pair.obstacle ? 0 : glm::length(state_.spin[pair.b]) * world_.bodies[pair.b].radius);
+  const double turning = turning_of(pair);
   GapMemory memory = state_.gaps[near.parts];
   const double falling = pair.obstacle ? glm::length(world_.gravity) : 0;
   // The first round uses the results of find().
@@ -851,9 +856,7 @@ void BodyContacts::find_in_pair(std::uint32_t index, double within, double extra
   const BodyPair& pair = world_.pairs[index];
   const MovingBody& body_a = world_.bodies[pair.a];
   const Vec3 velocity = pair.obstacle ? Vec3(0) : state_.motion[pair.b].velocity;
-  const double turning =
-      glm::length(state_.spin[pair.a]) * body_a.radius +
-      (pair.obstacle ? 0 : glm::length(state_.spin[pair.b]) * world_.bodies[pair.b].radius);
+  const double turning = turning_of(pair);
   const double spins =
       glm::length(state_.spin[pair.a] - (pair.obstacle ? Vec3(0) : state_.spin[pair.b]));
   const double reach = 2 * kTouching + extra +
@@ -932,9 +935,14 @@ void BodyContacts::measure_surfaces(std::uint32_t index, double reach, double tu
                      b = place_of(surface_b(pair), pose_of_other(pair));
   NearPlaces& found = state_.places;
   constexpr double kRocks = 0.01;  // rad; by so much contact forces may turn them besides
-  double gap = places ? find_places(a, b, reach, turn + kRocks, found) : gap_between(a, b, reach);
+  GapLimits limits{.reach = reach};
+  limits.depth += reach;
+  double gap = places ? find_places(a, b, limits, turn + kRocks, found) : gap_between(a, b, limits);
   // Where they overlap they are moved apart, which may close them elsewhere.
-  if (places && gap < -kTouching) gap = find_places(a, b, reach - 4 * gap, turn + kRocks, found);
+  if (places && gap < -kTouching) {
+    limits.reach -= 4 * gap;
+    gap = find_places(a, b, limits, turn + kRocks, found);
+  }
   state_.gaps[pair.first].least = gap;
   if (gap > reach) return;
   state_.near_parts.push_back({index, pair.first, gap, gap <= kTouching});

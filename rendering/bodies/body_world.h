@@ -296,6 +296,7 @@ class BodyContacts {
   void look_at_pair(std::uint32_t index, double within, double extra, bool places);
   void look_for(double within, double extra, std::span<const char> chosen, bool places);
   bool wake_near();
+  double turning_of(const BodyPair& pair) const;
   Gap gap_after(const BodyWorldState::NearParts& near, double time, double enough,
                 GapMemory& memory, Vec3& closing) const;
   double meeting_time(const BodyWorldState::NearParts& parts, double most);

@@ -25,15 +25,16 @@ constexpr double kParallel = 1e-6;  // rad
 /// The search through a pair of trees. All in the frame of b.
 class GapSearch {
  public:
-  GapSearch(const SurfacePlace& a, const SurfacePlace& b, double reach, double turn,
+  GapSearch(const SurfacePlace& a, const SurfacePlace& b, const GapLimits& limits, double turn,
             NearPlaces* out)
       : a_(*a.surface),
         b_(*b.surface),
         axes_(glm::transpose(b.axes) * a.axes),
         back_(glm::transpose(axes_)),
         position_(glm::transpose(b.axes) * (a.position - b.position)),
-        reach_(reach),
-        least_(std::max(reach, kSeen)),
+        reach_(limits.reach),
+        depth_(limits.depth),
+        least_(std::max(limits.reach, limits.depth)),
         turn_(std::max(turn, kExtreme)),
         out_(out) {
     for (glm::length_t i = 0; i < 3; ++i) sizes_[i] = glm::abs(axes_[i]);
@@ -56,7 +57,7 @@ class GapSearch {
   Vec3 into_a(const Vec3& p) const { return back_ * (p - position_); }
 
   /// What is to be looked at lies at most so far apart.
-  double bound() const { return std::max(out_ != nullptr ? reach_ : least_, kSeen); }
+  double bound() const { return std::max(out_ != nullptr ? reach_ : least_, depth_); }
 
   template <class Visit>
   void walk(const FeatureTree& of_a, const FeatureTree& of_b, const Visit& visit) {
@@ -104,7 +105,7 @@ class GapSearch {
       over &= glm::dot(face.inward[k], p) >= face.side[k] - kBorder;
     const Mat3& to_corner = corner_is_a ? back_ : axes_;
     if (over) {
-      if (height < -kSeen) return;
+      if (height < -depth_) return;
       if (!of.is_extreme(corner, to_corner * -face.normal, turn_)) return;
       if (height < -kShallow && hidden(other, p, -height * face.normal)) return;
       return add(p - 0.5 * height * face.normal, face.normal, height, corner_is_a);
@@ -169,7 +170,7 @@ class GapSearch {
     if (gap < -kShallow) {
       // The edge of one is behind that of the other: through both solids, if they overlap there.
       const Vec3 on_b = q + t * v;
-      if (gap < -kSeen || hidden(b_, p + s * u, on_b - p - s * u)) return;
+      if (gap < -depth_ || hidden(b_, p + s * u, on_b - p - s * u)) return;
     }
     add_along(0.5 * (p + s * u + q + t * v), normal, gap);
   }
@@ -200,7 +201,7 @@ class GapSearch {
   Mat3 axes_, back_;  ///< from a to b; its inverse
   Vec3 position_;
   Mat3 sizes_;  ///< absolute values of axes_
-  double reach_, least_, turn_;
+  double reach_, depth_, least_, turn_;
   NearPlaces* out_;
 };
 
@@ -278,17 +279,17 @@ void NearPlaces::make_room() {
   chosen.reserve(kMostChosen);
 }
 
-double gap_between(const SurfacePlace& a, const SurfacePlace& b, double reach) {
-  return GapSearch(a, b, reach, 0, nullptr).search();
+double gap_between(const SurfacePlace& a, const SurfacePlace& b, const GapLimits& limits) {
+  return GapSearch(a, b, limits, 0, nullptr).search();
 }
 
-double find_places(const SurfacePlace& a, const SurfacePlace& b, double reach, double turn,
-                   NearPlaces& out) {
+double find_places(const SurfacePlace& a, const SurfacePlace& b, const GapLimits& limits,
+                   double turn, NearPlaces& out) {
   constexpr double kOneNormal = 1 - 1e-7;  // cosine; 4.5e-4 rad
   out.all.clear();
   out.chosen.clear();
   out.dropped = false;
-  const double least = GapSearch(a, b, reach, turn, &out).search();
+  const double least = GapSearch(a, b, limits, turn, &out).search();
   for (std::span<NearPlace> left(out.all);
        !left.empty() && out.chosen.size() < NearPlaces::kMostChosen;) {
     const Vec3 normal = nearest_of(left).normal;

@@ -9,8 +9,11 @@
 
 namespace palpate::rendering {
 
-/// m; corners that are deeper inside the other surface are not seen.
-inline constexpr double kSeen = 1e-3;
+/// What is looked at, m.
+struct GapLimits {
+  double reach = 0;     ///< farther apart is of no interest
+  double depth = 1e-3;  ///< corners and edges that are deeper inside the other surface are not seen
+};
 
 /// A surface at its present place.
 struct SurfacePlace {
@@ -38,16 +41,15 @@ struct NearPlaces {
 /// The least gap of corners to faces, edges and corners, and of convex edges to each other, where
 /// each is the farthest of its surroundings towards the other (local minima of distance: Johnson &
 /// Willemsen 2003, Six degree-of-freedom haptic rendering of complex polygonal models; here with
-/// signs, so that overlaps of up to a millimetre have their depth).
-/// \param reach  m; farther apart is of no interest
-/// \return the least gap; if that is greater than `reach` and kSeen, the greater of these
-double gap_between(const SurfacePlace& a, const SurfacePlace& b, double reach);
+/// signs, so that overlaps have their depth).
+/// \return the least gap; if that is greater than both limits, the greater of these
+double gap_between(const SurfacePlace& a, const SurfacePlace& b, const GapLimits& limits);
 
 /// The same with the places within reach, of which `chosen` hold them apart as well as all: with
 /// each normal the nearest, and those that touch first in a turn. \param turn  rad, by which they
 /// may turn against each other: corners that are the farthest only then are places as well
-double find_places(const SurfacePlace& a, const SurfacePlace& b, double reach, double turn,
-                   NearPlaces& out);
+double find_places(const SurfacePlace& a, const SurfacePlace& b, const GapLimits& limits,
+                   double turn, NearPlaces& out);
 
 /// m; how deep the surfaces are inside each other: of corners, pieces of edges and middles of faces
 /// of each the one deepest inside the other. 0: they do not overlap. Slow.

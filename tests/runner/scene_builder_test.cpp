@@ -15,10 +15,13 @@
 #include <utility>
 #include <vector>
 
+#include "data/base/random.h"
 #include "rendering/bodies/moving_scene.h"
 #include "rendering/render_fault.h"
+#include "rendering/renderer.h"
 #include "rendering/union_contact.h"
 #include "stimuli/polygon_soup.h"
+#include "stimuli/primitives.h"
 #include "tests/shared/temporary_folder.h"
 
 namespace palpate::runner {
@@ -289,12 +292,48 @@ TEST(SceneBuilder, BodyMassCountsAllParts) {
         const rendering::Scene built = SceneBuilder().build(scene, true);
         const auto summary = rendering::moving_summary(built);
         EXPECT_NEAR(summary->heaviest, density * (of_angle + of_box), 1e-9);
-        EXPECT_EQ(summary->part_pairs, objects == 1 ? 0U : 3U) << "each part once";
+        EXPECT_EQ(summary->part_pairs, objects == 1 ? 0U : 1U) << "it meets by its surface";
         const rendering::RenderState state = built.initial_state();
         EXPECT_LT(glm::distance(state.motion.bodies()[0].centre, middle), 1e-9);
       }
     }
   }
+}
+
+TEST(SceneBuilder, LumpWithoutConvexPartsFallsOnWhatStands) {
+  const palpate::testing::TemporaryFolder folder;
+  const std::string file = folder / "lump.obj";
+  stimuli::PolygonSoup soup = stimuli::icosphere(0.02, 3);
+  Random random(7);
+  {
+    std::ofstream out(file);
+    out << std::setprecision(17);
+    for (const Vec3& v : soup.vertices) {
+      const double scale = 0.7 + 0.5 * random.unit();
+      out << "v " << scale * v.x << ' ' << scale * v.y << ' ' << scale * v.z << '\n';
+    }
+    for (const auto& face : soup.faces)
+      out << "f " << face[0] + 1 << ' ' << face[1] + 1 << ' ' << face[2] + 1 << '\n';
+  }
+  stimuli::ObjectSpec lump;
+  lump.shape = stimuli::ShapeKind::mesh;
+  lump.file = file;
+  lump.material = of(800, {});
+  stimuli::ObjectSpec other = lump;
+  lump.pose.position = {0.002, 0, 0.06};
+  lump.body = stimuli::Body{.mass = 0.05};
+  const rendering::Scene scene =
+      SceneBuilder().build({lump, other, box({-0.2, -0.2, -0.06}, {0.2, 0.2, -0.04}, of(800, {}))},
+                           true, {}, {0, 0, -9.81});
+  rendering::RenderState state = scene.initial_state();
+  const rendering::LineProbe far{{5, 5, 5}, {5, 5, 5.12}};
+  double lowest = 1;
+  for (int i = 0; i < 1500; ++i) {
+    rendering::ray_renderer().tick(scene, state, far, kServoPeriod);
+    lowest = std::min(lowest, state.motion.bodies()[0].centre.z);
+  }
+  EXPECT_GT(lowest, -0.04 + 0.008) << "through the floor";
+  EXPECT_LT(state.motion.bodies()[0].centre.z, 0.045) << "it has not fallen";
 }
 
 /// Two blocks that abut, each a group of a file. \param step  m, from one upper face to the other

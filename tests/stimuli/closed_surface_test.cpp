@@ -71,7 +71,7 @@ std::string notes_of(const CleanedSurface& cleaned) {
   return text;
 }
 
-std::string refusal_of(const PolygonSoup& soup) {
+std::string surface_refusal(const PolygonSoup& soup) {
   try {
     closed_surface(soup);
   } catch (const MeshError& error) {
@@ -371,27 +371,27 @@ TEST(ClosedSurfaceTest, AcceptsCavitiesAndRefusesInvertedShells) {
 
   PolygonSoup beside = cube(0.04);
   add_shell(beside, shifted(turned_over(cube(0.02)), Vec3(0.05, 0, 0)));
-  const std::string text = refusal_of(beside);
+  const std::string text = surface_refusal(beside);
   EXPECT_NE(text.find("negative: face "), std::string::npos) << text;
   EXPECT_NE(text.find("a shell there is turned inside out"), std::string::npos) << text;
 
   PolygonSoup partly = cube(0.04);
   add_shell(partly, shifted(turned_over(cube(0.02)), Vec3(0.0199, 0.001, 0.002)));
-  EXPECT_NE(refusal_of(partly).find("it passes through itself"), std::string::npos);
+  EXPECT_NE(surface_refusal(partly).find("it passes through itself"), std::string::npos);
 
-  EXPECT_NE(refusal_of(turned_over(cube(0.04))).find("inside out: all faces are clockwise"),
+  EXPECT_NE(surface_refusal(turned_over(cube(0.04))).find("inside out: all faces are clockwise"),
             std::string::npos);
 }
 
 // A dent pushed out through the far side leaves a region of negative winding.
 TEST(ClosedSurfaceTest, FindsSmallNegativeWindingInALargeMesh) {
   PolygonSoup sphere = icosphere(0.03, 4);
-  EXPECT_EQ(refusal_of(sphere), "");
+  EXPECT_EQ(surface_refusal(sphere), "");
   const Vec3 dent = sphere.vertices[0];
   for (Vec3& v : sphere.vertices) {
     if (v == dent) v = -1.05 * dent;
   }
-  EXPECT_NE(refusal_of(sphere).find("negative: face "), std::string::npos);
+  EXPECT_NE(surface_refusal(sphere).find("negative: face "), std::string::npos);
 }
 
 // A plate whose upper side is pushed through the lower one in one corner of its grid.
@@ -430,7 +430,7 @@ TEST(ClosedSurfaceTest, APocketThatNoHandFeelsIsNoted) {
 
 TEST(ClosedSurfaceTest, APocketThatAHandFeelsIsRefused) {
   for (const double depth : {1.2e-4, 5e-4, 1e-3})
-    EXPECT_NE(refusal_of(pierced_plate(depth)).find("negative: "), std::string::npos) << depth;
+    EXPECT_NE(surface_refusal(pierced_plate(depth)).find("negative: "), std::string::npos) << depth;
 }
 
 // The triangles of such faces are long, so that all their boxes meet.
@@ -468,7 +468,7 @@ TEST(ClosedSurfaceTest, FacesOfManyTrianglesAreTaken) {
         soup.faces.push_back({up + i, up + k, in + 1});
       }
     }
-    EXPECT_EQ(refusal_of(soup), "");
+    EXPECT_EQ(surface_refusal(soup), "");
   }
 }
 
@@ -491,43 +491,44 @@ TEST(ClosedSurfaceTest, TakesManyBarsThatPassThroughEachOther) {
       add_shell(soup, bar);
     }
   }
-  EXPECT_EQ(refusal_of(soup), "");
+  EXPECT_EQ(surface_refusal(soup), "");
 }
 
 TEST(ClosedSurfaceTest, RefusesOpenSurfacesWithPlaceAndAdvice) {
   PolygonSoup soup = cube(0.04);
   soup.faces.pop_back();
-  const std::string open = refusal_of(soup);
+  const std::string open = surface_refusal(soup);
   EXPECT_NE(open.find("open: edge "), std::string::npos) << open;
   EXPECT_NE(open.find("fill holes and orient faces in a modelling program"), std::string::npos);
 
   soup = cube(0.04);
   std::reverse(soup.faces[0].begin(), soup.faces[0].end());
-  EXPECT_NE(refusal_of(soup).find("turned face: edge "), std::string::npos);
+  EXPECT_NE(surface_refusal(soup).find("turned face: edge "), std::string::npos);
 
   soup = cube(0.04);
   soup.vertices.emplace_back(1, 1, 1);
   soup.faces.push_back({soup.faces[0][0], soup.faces[0][1], 8});
-  EXPECT_NE(refusal_of(soup).find(" belongs to 3 faces, and "), std::string::npos)
-      << refusal_of(soup);
+  EXPECT_NE(surface_refusal(soup).find(" belongs to 3 faces, and "), std::string::npos)
+      << surface_refusal(soup);
 
   soup = cube(0.04);
   soup.vertices[3].y = std::numeric_limits<double>::quiet_NaN();
-  EXPECT_NE(refusal_of(soup).find("not finite: vertex 3"), std::string::npos);
+  EXPECT_NE(surface_refusal(soup).find("not finite: vertex 3"), std::string::npos);
   soup.vertices[3].y = 1e31;
-  EXPECT_NE(refusal_of(soup).find("not finite: vertex 3"), std::string::npos);
-  EXPECT_NE(refusal_of({}).find("empty"), std::string::npos);
+  EXPECT_NE(surface_refusal(soup).find("not finite: vertex 3"), std::string::npos);
+  EXPECT_NE(surface_refusal({}).find("empty"), std::string::npos);
 
   soup = cube(0.04);
   for (Vec3& v : soup.vertices) v.z = 0;
-  EXPECT_NE(refusal_of(soup).find("flat: expected a solid"), std::string::npos) << refusal_of(soup);
+  EXPECT_NE(surface_refusal(soup).find("flat: expected a solid"), std::string::npos)
+      << surface_refusal(soup);
 }
 
 TEST(ClosedSurfaceTest, AGapIsDistinguishedFromAHole) {
   PolygonSoup soup = cube(0.04);
   soup.vertices.push_back(soup.vertices[soup.faces[0][0]] + Vec3(1e-7, 0, 0));
   soup.faces[0][0] = 8;
-  const std::string text = refusal_of(soup);
+  const std::string text = surface_refusal(soup);
   EXPECT_NE(text.find("crowded: 1 corners on open edges are nearer than "), std::string::npos)
       << text;
 }

@@ -127,7 +127,7 @@ TEST(Primitives, ImpossibleSizesAreRefused) {
 }
 
 template <class Make>
-std::string refusal_of(Make&& make) {
+std::string argument_refusal(Make&& make) {
   try {
     make();
   } catch (const std::invalid_argument& error) {
@@ -137,18 +137,18 @@ std::string refusal_of(Make&& make) {
 }
 
 TEST(Primitives, RefusalsNameShapeNumberAndAllowedValues) {
-  EXPECT_EQ(refusal_of([] { cone(-0.5, 1, 8); }),
+  EXPECT_EQ(argument_refusal([] { cone(-0.5, 1, 8); }),
             "cone: the radius must be a length above 0 m, not -0.500000");
-  EXPECT_EQ(refusal_of([] { cylinder(1, 0, 8); }),
+  EXPECT_EQ(argument_refusal([] { cylinder(1, 0, 8); }),
             "cylinder: the height must be a length above 0 m, not 0.000000");
   for (const int bad : {-1, 9})
-    EXPECT_EQ(refusal_of([&] { icosphere(1, bad); }),
+    EXPECT_EQ(argument_refusal([&] { icosphere(1, bad); }),
               "sphere: the number of subdivisions must be from 0 to 8, not " + std::to_string(bad));
-  EXPECT_EQ(refusal_of([] { cone(1, 1, 2); }),
+  EXPECT_EQ(argument_refusal([] { cone(1, 1, 2); }),
             "cone: the number of segments must be from 3 to 65536, not 2");
   for (const int bad : {-64, 65537, std::numeric_limits<int>::max()})
     EXPECT_EQ(
-        refusal_of([&] { cylinder(1, 1, bad); }),
+        argument_refusal([&] { cylinder(1, 1, bad); }),
         "cylinder: the number of segments must be from 3 to 65536, not " + std::to_string(bad));
 }
 

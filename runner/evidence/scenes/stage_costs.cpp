@@ -65,7 +65,7 @@ StageCost bodies_stage(const rendering::Scene& scene, const rendering::Renderer&
   text.precision(3);
   text << moving.bodies << (moving.bodies == 1 ? " object moves" : " objects move") << " ("
        << moving.lightest << " to " << moving.heaviest << " kg), " << moving.obstacles
-       << " stand still; " << moving.part_pairs << " pairs of convex parts may meet; "
+       << " stand still; " << moving.part_pairs << " pairs of convex parts or surfaces may meet; "
        << 1e-3 * took.count() / kTicks
        << " us a tick over the first half second without the probe; what rests sleeps";
   return {{"moving bodies", StageTime::tick, true, text.str()}, std::nullopt};

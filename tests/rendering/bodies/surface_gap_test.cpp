@@ -123,8 +123,8 @@ TEST(SurfaceGap, EqualsEveryPairOfTriangles) {
       const SurfacePlace at_b = at(b, Vec3(0), stimuli::uniform_rotation(random));
       if (cross(at_a, at_b)) continue;
       const double exact = every_pair(at_a, at_b);
-      EXPECT_NEAR(gap_between(at_a, at_b, 1), exact, 1e-12) << seed << ' ' << i;
-      EXPECT_NEAR(gap_between(at_b, at_a, 1), exact, 1e-12) << seed << ' ' << i;
+      EXPECT_NEAR(gap_between(at_a, at_b, {1}), exact, 1e-12) << seed << ' ' << i;
+      EXPECT_NEAR(gap_between(at_b, at_a, {1}), exact, 1e-12) << seed << ' ' << i;
       ++judged;
     }
   }
@@ -135,10 +135,10 @@ TEST(SurfaceGap, ShortReachFindsNoMore) {
   Random random(4);
   const CollisionSurface a = surface_of(lump(random, 2)), b = surface_of(lump(random, 2));
   const SurfacePlace at_a = at(a, Vec3(0)), at_b = at(b, Vec3(0.06, 0, 0));
-  const double gap = gap_between(at_a, at_b, 1);
+  const double gap = gap_between(at_a, at_b, {1});
   EXPECT_GT(gap, 2e-3);
-  EXPECT_EQ(gap_between(at_a, at_b, 1e-8), kSeen);
-  EXPECT_EQ(gap_between(at_a, at_b, 1.01 * gap), gap);
+  EXPECT_EQ(gap_between(at_a, at_b, {1e-8, 1e-3}), 1e-3);
+  EXPECT_EQ(gap_between(at_a, at_b, {1.01 * gap}), gap);
 }
 
 TEST(SurfaceGap, BoxLiesOnItsFourCorners) {
@@ -148,8 +148,8 @@ TEST(SurfaceGap, BoxLiesOnItsFourCorners) {
   places.make_room();
   for (const double gap : {5e-9, 0.0, -5e-9, 1e-6, -1e-5}) {
     const Quat turn = glm::angleAxis(0.3, Vec3(0, 0, 1));
-    EXPECT_NEAR(find_places(at(box, Vec3(0.01, 0.02, 0.015 + gap), turn), at(floor, Vec3(0)), 1e-5,
-                            1e-4, places),
+    EXPECT_NEAR(find_places(at(box, Vec3(0.01, 0.02, 0.015 + gap), turn), at(floor, Vec3(0)),
+                            {1e-5}, 1e-4, places),
                 gap, 1e-15);
     ASSERT_EQ(places.chosen.size(), 4U);
     for (const NearPlace& place : places.chosen) {
@@ -194,7 +194,7 @@ TEST(SurfaceGap, InnerEdgesOfAPlateAreNone) {
     // Over an inner edge as well.
     const Vec3 place(i % 2 == 0 ? 0.05 : uniform(random, 0.03, 0.07), uniform(random, 0.03, 0.07),
                      0.01 - lowest + 1e-8);
-    find_places(at(box, place, turn), at(flat, Vec3(0)), 2e-3, 1e-3, places);
+    find_places(at(box, place, turn), at(flat, Vec3(0)), {2e-3}, 1e-3, places);
     ASSERT_FALSE(places.chosen.empty());
     for (const NearPlace& one : places.chosen) EXPECT_NEAR(one.normal.z, -1, 1e-9);
   }
