@@ -3,9 +3,29 @@
 #include <cstdio>
 
 #include "protocols/schedule.h"
+#include "protocols/session_plan.h"
 
 using namespace palpate;
 using namespace palpate::protocols;
+
+namespace {
+
+/// Schedules are drawn without one.
+class NoRule final : public OrderRule {
+ public:
+  SessionSequences sequences(const Protocol&, int, int) const override { return {}; }
+  const char* conditions_in_words() const override { return ""; }
+  std::vector<std::string> conditions(const Protocol&, int) const override { return {}; }
+  std::string condition_of(const std::string&, const std::string&) const override { return {}; }
+};
+
+}  // namespace
+
+/// Instead of session_plan.cpp, which needs JSON.
+const OrderRule& palpate::protocols::order_of_blocks() {
+  static const NoRule rule;
+  return rule;
+}
 
 int main() {
   Protocol protocol;

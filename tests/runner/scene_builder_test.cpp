@@ -322,9 +322,8 @@ TEST(SceneBuilder, LumpWithoutConvexPartsFallsOnWhatStands) {
   stimuli::ObjectSpec other = lump;
   lump.pose.position = {0.002, 0, 0.06};
   lump.body = stimuli::Body{.mass = 0.05};
-  const rendering::Scene scene =
-      SceneBuilder().build({lump, other, box({-0.2, -0.2, -0.06}, {0.2, 0.2, -0.04}, of(800, {}))},
-                           true, {}, {0, 0, -9.81});
+  const rendering::Scene scene = SceneBuilder().build(
+      {lump, other, box({-4, -4, -0.06}, {4, 4, -0.04}, of(800, {}))}, true, {}, {0, 0, -9.81});
   rendering::RenderState state = scene.initial_state();
   const rendering::LineProbe far{{5, 5, 5}, {5, 5, 5.12}};
   double lowest = 1;
