@@ -129,7 +129,7 @@ std::uint32_t FeatureTree::build(std::span<Item> items) {
 }
 
 CollisionSurface::CollisionSurface(std::vector<Vec3> vertices,
-                                   std::vector<std::array<std::uint32_t, 3>> triangles)
+                                   const std::vector<std::array<std::uint32_t, 3>>& triangles)
     : vertices_(std::move(vertices)) {
   make_faces(triangles);
   find_neighbours();

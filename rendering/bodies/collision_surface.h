@@ -60,7 +60,8 @@ class CollisionSurface {
  public:
   /// Triangles, counter-clockwise seen from outside; equal corners have equal numbers. Where
   /// several closed shells overlap, each of them collides.
-  CollisionSurface(std::vector<Vec3> vertices, std::vector<std::array<std::uint32_t, 3>> triangles);
+  CollisionSurface(std::vector<Vec3> vertices,
+                   const std::vector<std::array<std::uint32_t, 3>>& triangles);
   /// \param pose  of its frame in that of the body
   CollisionSurface(const Surface& surface, const Pose& pose);
 
