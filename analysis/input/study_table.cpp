@@ -459,7 +459,8 @@ StudyTable read_tasks_csv(const std::string& path, const std::vector<std::string
   faults.reserve(twice.size());
   for (const std::string& name : twice)
     faults.push_back({path, "line 1", "expected each column once; " + name + " comes again"});
-  for (const auto& [name, place] : columns) {
+  for (const auto& column : columns) {
+    const std::string& name = column.first;
     const bool read = std::ranges::any_of(dimensions, [&](const auto& block) {
       return std::ranges::find(block.second, name) != block.second.end();
     });

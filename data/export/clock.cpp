@@ -54,6 +54,7 @@ std::vector<std::string> dimensions_of(const std::vector<ProtocolInfo>& protocol
 
 std::vector<std::string> texts_of(const std::vector<ProtocolInfo>& protocols) {
   std::vector<std::string> out;
+  out.reserve(protocols.size());
   for (const ProtocolInfo& protocol : protocols) out.push_back(protocol.text);
   return out;
 }

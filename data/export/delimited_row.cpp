@@ -510,7 +510,14 @@ struct ColumnSets {
   bool relative = false, groups = false;
   std::vector<std::pair<std::string, std::string>> levels = {};  ///< of factors
   std::vector<std::string> dimensions = {};
-  auto operator<=>(const ColumnSets&) const = default;
+  bool operator<(const ColumnSets& other) const { return all() < other.all(); }
+
+ private:
+  std::tuple<bool, const decltype(parts)&, bool, bool, const decltype(levels)&,
+             const decltype(dimensions)&>
+  all() const {
+    return {cut_off, parts, relative, groups, levels, dimensions};
+  }
 };
 
 /// \param cut_off  of attempts that were cut off
