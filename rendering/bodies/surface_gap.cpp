@@ -243,7 +243,19 @@ void choose_of(std::span<const NearPlace> places, double turn, std::vector<NearP
   }
 }
 
-/// The deepest place inside another surface of corners, pieces of edges and middles of faces.
+/// The middle of the solid under a point of a face, in its own frame.
+Vec3 middle_under(const CollisionSurface& surface, const CollisionSurface::Face& face,
+                  const Vec3& point) {
+  const Vec3 along = -4 * glm::length(surface.face_tree().node(0).half) * face.normal;
+  double first = 1;
+  surface.crossings(point, along, [&](double t, std::uint32_t) {
+    if (t > 1e-9) first = std::min(first, t);
+  });
+  return point + 0.5 * first * along;
+}
+
+/// The deepest place inside another surface of corners, pieces of edges, middles of faces, and of
+/// the solid under these: surfaces may coincide.
 double depth_inside(const SurfacePlace& a, const SurfacePlace& b) {
   const Mat3 back = glm::transpose(b.axes), axes = back * a.axes;
   const Vec3 position = back * (a.position - b.position);
@@ -267,7 +279,12 @@ double depth_inside(const SurfacePlace& a, const SurfacePlace& b) {
       for (std::size_t i = 0; i + 1 < crossed.size(); ++i)
         look(from + 0.5 * (crossed[i] + crossed[i + 1]) * along);
     }
-    look((at(face.corners[0]) + at(face.corners[1]) + at(face.corners[2])) / 3.0);
+    const auto& v = a.surface->vertices();
+    const Vec3 middle = (v[face.corners[0]] + v[face.corners[1]] + v[face.corners[2]]) / 3.0;
+    look(axes * middle + position);
+    const Vec3 under = middle_under(*a.surface, face, middle), in_b = axes * under + position;
+    if (b.surface->contains(in_b) && a.surface->contains(under))
+      deepest = std::max(deepest, std::min(a.surface->distance(under), b.surface->distance(in_b)));
   }
   return deepest;
 }

@@ -51,8 +51,8 @@ double gap_between(const SurfacePlace& a, const SurfacePlace& b, const GapLimits
 double find_places(const SurfacePlace& a, const SurfacePlace& b, const GapLimits& limits,
                    double turn, NearPlaces& out);
 
-/// m; how deep the surfaces are inside each other: of corners, pieces of edges and middles of faces
-/// of each the one deepest inside the other. 0: they do not overlap. Slow.
+/// m; how deep the surfaces are inside each other: of corners, pieces of edges, middles of faces
+/// and of the solid under these the one deepest inside the other. 0: they do not overlap. Slow.
 double overlap_of(const SurfacePlace& a, const SurfacePlace& b);
 
 }  // namespace palpate::rendering

@@ -207,6 +207,8 @@ TEST(SurfaceGap, OverlapHasItsDepth) {
   EXPECT_NEAR(overlap_of(at(box, Vec3(0)), at(box, Vec3(0.029, 0, 0))), 1e-3, 1e-9);
   EXPECT_GT(overlap_of(at(box, Vec3(0)), at(box, Vec3(0.01, 0.01, 0))), 4e-3);
   EXPECT_EQ(overlap_of(at(box, Vec3(0)), at(box, Vec3(0.0301, 0, 0))), 0);
+  for (const CollisionSurface* one : {&box, &stairs})
+    EXPECT_GT(overlap_of(at(*one, Vec3(0)), at(*one, Vec3(0))), 4e-3) << "at one place";
   // Crossed bars: no corner of one is in the other.
   EXPECT_GT(overlap_of(at(box, Vec3(0)), at(box, Vec3(0), glm::angleAxis(1.57, Vec3(0, 0, 1)))),
             4e-3);
