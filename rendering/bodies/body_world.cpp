@@ -934,11 +934,11 @@ void BodyContacts::measure_surfaces(std::uint32_t index, double reach, double tu
   const SurfacePlace a = place_of(*world_.bodies[pair.a].surface, pose_of(pair.a)),
                      b = place_of(surface_b(pair), pose_of_other(pair));
   NearPlaces& found = state_.places;
-  constexpr double kRocks = 0.01;  // rad; by so much contact forces may turn them besides
+  constexpr double kRocks = 0.01;  // rad; contact forces may turn them by this much more
   GapLimits limits{.reach = reach};
   limits.depth += reach;
   double gap = places ? find_places(a, b, limits, turn + kRocks, found) : gap_between(a, b, limits);
-  // Where they overlap they are moved apart, which may close them elsewhere.
+  // Moving overlapping bodies apart may close a gap elsewhere.
   if (places && gap < -kTouching) {
     limits.reach -= 4 * gap;
     gap = find_places(a, b, limits, turn + kRocks, found);

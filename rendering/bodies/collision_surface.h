@@ -86,7 +86,7 @@ class CollisionSurface {
   const FeatureTree& corner_tree() const { return corner_tree_; }  ///< convex vertices
   const FeatureTree& edge_tree() const { return edge_tree_; }
   const FeatureTree& face_tree() const { return face_tree_; }
-  /// The face that speaks for a vertex where several would.
+  /// The face that reports contacts of a vertex: one of those around it.
   std::uint32_t face_of(std::uint32_t vertex) const { return face_of_[vertex]; }
   bool is_corner(std::uint32_t vertex) const { return is_corner_[vertex] != 0; }
 

@@ -147,7 +147,7 @@ bool ComplementarityProblem::drive(std::size_t row, int& pivots_left) {
     find_rates(row);
     const double own_rate = direction * rate_[row];
     // A row that depends on the free ones does not respond until one of them has gone to its bound.
-    // Where it is only rounding that violates it, it stays as it is, and so does friction.
+    // Violations within rounding, and friction, are left as they are.
     const bool answers = std::abs(own_rate) > 1e-12 * std::abs(a(row, row));
     const bool violated = std::abs(w_[row]) > kFelt * (1 + std::abs(b_[row]));
     double step = answers ? -w_[row] / own_rate : HUGE_VAL;
@@ -185,7 +185,7 @@ bool ComplementarityProblem::drive(std::size_t row, int& pivots_left) {
         at = k;
       }
     }
-    if (!(step < HUGE_VAL)) return done_.push_back(row), true;  // nothing can help it
+    if (!(step < HUGE_VAL)) return done_.push_back(row), true;  // no impulse can satisfy it
     x_[row] += direction * step;
     w_[row] += own_rate * step;
     for (std::size_t k = 0; k < free_.size(); ++k) x_[free_[k]] += direction * step * change_[k];

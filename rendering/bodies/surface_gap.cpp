@@ -16,9 +16,9 @@
 namespace palpate::rendering {
 namespace {
 
-constexpr double kShallow = 2e-5;   // m; deeper ones are, if nothing lies between
-constexpr double kBorder = 1e-9;    // m; so far beyond the border of a face is still over it
-constexpr double kCorner = 1e-11;   // m; so near to a corner is at the corner
+constexpr double kShallow = 2e-5;   // m; deeper overlaps count only if no face lies between
+constexpr double kBorder = 1e-9;    // m; a point this far beyond a face's border is still over it
+constexpr double kCorner = 1e-11;   // m; a point this near to a corner is at the corner
 constexpr double kExtreme = 1e-7;   // rad
 constexpr double kParallel = 1e-6;  // rad
 
@@ -56,7 +56,7 @@ class GapSearch {
   Vec3 into_b(const Vec3& p) const { return axes_ * p + position_; }
   Vec3 into_a(const Vec3& p) const { return back_ * (p - position_); }
 
-  /// What is to be looked at lies at most so far apart.
+  /// m; features farther apart than this are skipped.
   double bound() const { return std::max(out_ != nullptr ? reach_ : least_, depth_); }
 
   template <class Visit>
@@ -120,7 +120,7 @@ class GapSearch {
     const Vec3 normal = way / distance;
     for (std::size_t k = 0; k < 3; ++k) {
       if (glm::distance(nearest, triangle[k]) > kCorner) continue;
-      // Between two corners, one of the two searches speaks; of several faces, one.
+      // Report a pair of corners once: in one of the two searches, for one face.
       if (!corner_is_a && other.is_corner(corners[k])) return;
       if (other.face_of(corners[k]) != index) return;
       if (!other.is_extreme(corners[k], normal, kExtreme)) return;
@@ -168,7 +168,7 @@ class GapSearch {
     }
     if (!b_.is_extreme(b, -normal, kExtreme)) return;
     if (gap < -kShallow) {
-      // The edge of one is behind that of the other: through both solids, if they overlap there.
+      // They overlap only if nothing lies between the two edges.
       const Vec3 on_b = q + t * v;
       if (gap < -depth_ || hidden(b_, p + s * u, on_b - p - s * u)) return;
     }
