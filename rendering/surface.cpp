@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "rendering/surface_search.h"
+#include "stimuli/flat_faces.h"
 
 namespace palpate::rendering {
 namespace {
@@ -167,6 +168,7 @@ void Surface::add(const SurfaceShell& shell) {
   materials_.push_back(shell.material);
   coordinate_error_ =
       std::max(coordinate_error_, shell.surface->coordinate_error + shell.pose_error);
+  share_planes(shell.surface->flat_face, base);
   for (std::uint32_t i = base; i < triangles_.size(); ++i) {
     SurfaceTriangle& t = triangles_[i];
     if (t.normal != Vec3(0)) continue;
@@ -174,6 +176,46 @@ void Surface::add(const SurfaceShell& shell) {
     t.offset = glm::dot(t.normal, vertices_[t.corners[0]]);
   }
   add_backs(shell.surface->at_pockets, base);
+}
+
+/// Gives all triangles of a large plane face one plane, to the bit: no segment touches the edges
+/// between them, into however many slivers the face is cut. None of its corners is below it: a tool
+/// that came in between a higher plane and its outline would not meet it. Faces whose file rounds
+/// their corners to somewhere near a plane keep a plane for each triangle.
+/// \param face  of each triangle of a shell \param first  triangle of the shell
+void Surface::share_planes(std::span<const std::uint32_t> face, std::uint32_t first) {
+  constexpr double kEven = 1e-12;  // of the distance from the origin; rounding of doubles
+  struct Plane {
+    Vec3 areas{0}, normal{0};
+    double highest = -HUGE_VAL, lowest = HUGE_VAL, reach = 0;
+  };
+  std::vector<Plane> planes;
+  const auto for_each = [&](const auto& visit) {
+    for (std::size_t i = 0; i < face.size(); ++i) {
+      if (face[i] == stimuli::kNoFlatFace) continue;
+      if (face[i] >= planes.size()) planes.resize(face[i] + 1);
+      visit(planes[face[i]], triangles_[first + i]);
+    }
+  };
+  for_each([&](Plane& plane, const SurfaceTriangle& t) {
+    const Vec3& a = vertices_[t.corners[0]];
+    plane.areas += glm::cross(vertices_[t.corners[1]] - a, vertices_[t.corners[2]] - a);
+  });
+  for (Plane& plane : planes) plane.normal = glm::normalize(plane.areas);
+  for_each([&](Plane& plane, const SurfaceTriangle& t) {
+    for (const std::uint32_t corner : t.corners) {
+      const double height = glm::dot(plane.normal, vertices_[corner]);
+      plane.highest = std::max(plane.highest, height);
+      plane.lowest = std::min(plane.lowest, height);
+      plane.reach = std::max(plane.reach, glm::length(vertices_[corner]));
+    }
+  });
+  for_each([&](const Plane& plane, SurfaceTriangle& t) {
+    if (plane.highest - plane.lowest > kEven * plane.reach) return;
+    t.normal = plane.normal;
+    t.offset = plane.lowest;
+    t.touched |= SurfaceTriangle::kSharesPlane;
+  });
 }
 
 /// Adds the reverse of each triangle that may bound a pocket. Between the two no tool gets into it,
@@ -186,7 +228,7 @@ void Surface::add_backs(std::span<const std::uint32_t> at_pockets, std::uint32_t
     std::swap(t.corners[1], t.corners[2]);
     t.normal = -t.normal;
     t.offset = -t.offset;
-    t.touched = SurfaceTriangle::kBack;
+    t.touched |= SurfaceTriangle::kBack;
     for (std::uint32_t k = 0; k < 3; ++k) {
       const std::uint32_t across = triangles_[first + i].across[2 - k];
       const auto beyond =
@@ -223,8 +265,12 @@ void Surface::find_edges() {
       const std::uint32_t across = triangles_[i].across[k];
       SurfaceTriangle& other = triangles_[SurfaceTriangle::triangle_of(across)];
       const std::uint32_t side = SurfaceTriangle::side_of(across);
-      if (triangles_[i].touches(k) || other.touches(side) ||
-          is_flat(triangles_[i].normal, other.normal)) {
+      if (triangles_[i].shares_plane() && triangles_[i].normal == other.normal &&
+          triangles_[i].offset == other.offset) {
+        triangles_[i].touched &= ~(1U << k);  // never a silhouette
+        other.touched &= ~(1U << side);
+      } else if (triangles_[i].touches(k) || other.touches(side) ||
+                 is_flat(triangles_[i].normal, other.normal)) {
         triangles_[i].touched |= 1U << k;
         other.touched |= 1U << side;
       }

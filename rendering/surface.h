@@ -25,7 +25,8 @@ struct alignas(64) SurfaceTriangle {
   std::uint32_t shell = 0;  ///< index in Surface::materials()
   /// Bit k: side k is not concave, so a segment can touch it, or folded. Bit 3 + k: it is folded.
   /// Bit 6 + k: nothing lies beyond side k of a back. Bit 9: it is a back, the reverse of another
-  /// triangle, so that no tool gets into a pocket (ClosedSurface::at_pockets).
+  /// triangle, so that no tool gets into a pocket (ClosedSurface::at_pockets). Bit 10: it shares
+  /// its plane with others, to the bit, and a corner may lie above it by rounding.
   std::uint16_t touched = 0;
   std::uint16_t owned = 0;  ///< bit k: of the two triangles at side k it is the first in its file
 
@@ -35,7 +36,8 @@ struct alignas(64) SurfaceTriangle {
   bool folded(std::uint32_t k) const { return (touched >> (3 + k) & 1) != 0; }
   bool ends(std::uint32_t k) const { return (touched >> (6 + k) & 1) != 0; }
   bool is_back() const { return (touched & kBack) != 0; }
-  static constexpr std::uint16_t kBack = 1U << 9;
+  bool shares_plane() const { return (touched & kSharesPlane) != 0; }
+  static constexpr std::uint16_t kBack = 1U << 9, kSharesPlane = 1U << 10;
   bool owns(std::uint32_t k) const { return (owned >> k & 1) != 0; }
 };
 
@@ -113,6 +115,7 @@ class Surface {
 
  private:
   void add(const SurfaceShell& shell);
+  void share_planes(std::span<const std::uint32_t> face, std::uint32_t first);
   void add_backs(std::span<const std::uint32_t> at_pockets, std::uint32_t first);
   double widest_seam() const;
   template <class Visit>

@@ -64,7 +64,8 @@ void sweep_end(const Surface& surface, std::uint32_t index, std::uint8_t segment
                const Vec3& from, const Vec3& to, double tolerance, double border, PatchHit& first) {
   const SurfaceTriangle& t = surface.triangles()[index];
   const Vec3 a = surface.vertices()[t.corners[0]] - from;
-  const double start = -glm::dot(t.normal, a);
+  const double start =
+      t.shares_plane() ? glm::dot(t.normal, from) - t.offset : -glm::dot(t.normal, a);
   if (start < -tolerance) return;
   const Vec3 way = to - from;
   const double fall = -glm::dot(t.normal, way);
@@ -141,6 +142,7 @@ PatchPlane plane_of(const Surface& surface, const SurfacePatch& patch, const Pos
   if (patch.kind == PatchKind::face) {
     const SurfaceTriangle& t = surface.triangles()[patch.triangle()];
     const Vec3 end = segment.end(patch.tail);
+    if (t.shares_plane()) return {t.normal, t.offset - glm::dot(t.normal, end)};
     return {t.normal, glm::dot(t.normal, surface.vertices()[t.corners[0]] - end)};
   }
   const EdgeOf edge = edge_of(surface, patch.side);

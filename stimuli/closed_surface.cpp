@@ -14,6 +14,7 @@
 
 #include "stimuli/coplanar.h"
 #include "stimuli/face_triangles.h"
+#include "stimuli/flat_faces.h"
 #include "stimuli/half_edges.h"
 #include "stimuli/mesh_names.h"
 #include "stimuli/polygon_soup.h"
@@ -33,6 +34,8 @@ constexpr const char* kClose = "; fill holes and orient faces in a modelling pro
 
 // m, in units of a coordinate's error: nearer than this, a corner lies on a line or on another one.
 constexpr double kFlatErrors = 4;
+// The same: from a plane face. Rounding moves a corner by up to the root of 3.
+constexpr double kPlaneErrors = 2.5;
 // m, in the same units: corners on open edges nearer than this are meant to be one.
 constexpr double kRimErrors = 8;
 // With more open edges than this, a surface is not a closed one with flaws.
@@ -80,6 +83,8 @@ class Cleaner {
     }
     ClosedSurface surface = take_surface();
     surface.coordinate_error = soup_.coordinate_error;
+    surface.flat_face = find_flat_faces(surface, kPlaneErrors * error_);
+    if (given_up_) cut_flat_faces_anew(surface);
     Pockets pockets = given_up_ ? checked_meanwhile(surface) : checked(surface);
     if (pockets.depth > 0) {
       char text[200];
@@ -90,6 +95,7 @@ class Cleaner {
       notes_.emplace_back(text);
     }
     surface.at_pockets = std::move(pockets.triangles);
+    if (!given_up_) cut_flat_faces_anew(surface);  // the check named triangles by their faces
     return {std::move(surface), std::move(notes_)};
   }
 

@@ -26,6 +26,8 @@ struct ClosedSurface {
   double coordinate_error = 0;  ///< m, of each coordinate as its file rounds it; 0: not rounded
   /// Triangles that may bound a pocket, or a part of each does: there is no solid behind that part.
   std::vector<std::uint32_t> at_pockets = {};
+  /// Of each triangle, as of find_flat_faces (flat_faces.h). Empty: no face is large and plane.
+  std::vector<std::uint32_t> flat_face = {};
 };
 
 /// The surface that polygons bound, and what was done to them to get it.
@@ -35,7 +37,8 @@ struct CleanedSurface {
 };
 
 /// Welds corners at equal coordinates, triangulates, leaves out triangles without area within the
-/// coordinates' error (their neighbours close the gap). Shells may overlap.
+/// coordinates' error (their neighbours close the gap), cuts large plane faces anew (flat_faces.h).
+/// Shells may overlap.
 /// \throws MeshError with the faults of the polygons as their file names them, and advice: open,
 /// turned, inside out, winds round some place a negative number of times, not finite, too large.
 CleanedSurface closed_surface(const PolygonSoup& soup);

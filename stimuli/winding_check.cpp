@@ -11,6 +11,7 @@
 
 #include "stimuli/closed_surface.h"
 #include "stimuli/exact_side.h"
+#include "stimuli/flat_faces.h"
 #include "stimuli/mesh_names.h"
 
 namespace palpate::stimuli {
@@ -67,46 +68,6 @@ struct SmallBox {
   }
 };
 
-constexpr Index kNoSheet = std::numeric_limits<Index>::max();
-
-/// Names the plane region of each triangle, if it is large. Its triangles need not be compared with
-/// each other: where it lies on itself, its border does, and the triangles beyond the border are
-/// found there. Those of a polygon with many corners are long, and all their boxes meet.
-std::vector<Index> sheets_of(const ClosedSurface& surface, double tolerance) {
-  constexpr std::size_t kLeast = 64;  // triangles
-  const auto corner = [&](Index t, std::size_t k) -> const Vec3& {
-    return surface.vertices[surface.triangles[t][k]];
-  };
-  const auto area = [&](Index t) {
-    return glm::cross(corner(t, 1) - corner(t, 0), corner(t, 2) - corner(t, 0));
-  };
-  std::vector<Index> sheet(surface.triangles.size(), kNoSheet), region;
-  for (Index first = 0; first < sheet.size(); ++first) {
-    const Vec3 twice = area(first);
-    if (sheet[first] != kNoSheet || twice == Vec3(0)) continue;
-    const Vec3 normal = glm::normalize(twice), origin = corner(first, 0);
-    const auto is_in_plane = [&](Index t) {
-      bool near = glm::dot(area(t), normal) > 0;
-      for (std::size_t k = 0; k < 3; ++k)
-        near = near && std::abs(glm::dot(normal, corner(t, k) - origin)) <= 0.5 * tolerance;
-      return near;
-    };
-    region = {first};
-    sheet[first] = first;
-    for (std::size_t i = 0; i < region.size(); ++i) {
-      for (const Index t : surface.across[region[i]]) {
-        if (sheet[t] != kNoSheet || !is_in_plane(t)) continue;
-        sheet[t] = first;
-        region.push_back(t);
-      }
-    }
-    if (region.size() < kLeast) {
-      for (const Index t : region) sheet[t] = kNoSheet;
-    }
-  }
-  return sheet;
-}
-
 /// A tree over the triangles, halved between shells, then along a space-filling curve.
 class Tree {
  public:
@@ -114,13 +75,12 @@ class Tree {
     SmallBox box;
     Index begin = 0, end = 0;  ///< of `order`
     Index right = 0;           ///< the left child is the next node; 0: a leaf
-    Index sheet = 0;           ///< of all its triangles, or kNoSheet
+    Index face = 0;            ///< that all its triangles are part of, or kNoFlatFace
   };
 
   /// \param shell  of each triangle; all alike: halved along the curve alone
-  Tree(const ClosedSurface& surface, const std::vector<Index>& shell,
-       const std::vector<Index>& sheet)
-      : surface_(surface), shell_(shell), sheet_(sheet) {
+  Tree(const ClosedSurface& surface, const std::vector<Index>& shell)
+      : surface_(surface), shell_(shell) {
     Box all;
     for (const Vec3& v : surface.vertices) all.add(v);
     const double size = std::max({all.high.x - all.low.x, all.high.y - all.low.y,
@@ -159,6 +119,9 @@ class Tree {
   using Key = std::pair<std::uint64_t, Index>;
   static constexpr Index kLeaf = 4;
 
+  Index face_of(Index t) const {
+    return surface_.flat_face.empty() ? kNoFlatFace : surface_.flat_face[t];
+  }
   Index first_shell(const Node& node) const { return shell_[order_[node.begin]]; }
   Index last_shell(const Node& node) const { return shell_[order_[node.end - 1]]; }
 
@@ -177,12 +140,12 @@ class Tree {
 
   void build(const std::vector<Key>& keys, Index begin, Index end) {
     const std::size_t self = nodes_.size();
-    nodes_.push_back({{}, begin, end, 0, sheet_[order_[begin]]});
+    nodes_.push_back({{}, begin, end, 0, face_of(order_[begin])});
     if (end - begin <= kLeaf) {
       Box all;
       for (Index i = begin; i < end; ++i) {
         all.add(box(order_[i]));
-        if (sheet_[order_[i]] != nodes_[self].sheet) nodes_[self].sheet = kNoSheet;
+        if (face_of(order_[i]) != nodes_[self].face) nodes_[self].face = kNoFlatFace;
       }
       nodes_[self].box = SmallBox(all);
       return;
@@ -210,13 +173,12 @@ class Tree {
     build(keys, middle, end);
     nodes_[self].box = nodes_[self + 1].box;
     nodes_[self].box.add(nodes_[right].box);
-    const Index sheet = nodes_[self + 1].sheet;
-    nodes_[self].sheet = nodes_[right].sheet == sheet ? sheet : kNoSheet;
+    const Index face = nodes_[self + 1].face;
+    nodes_[self].face = nodes_[right].face == face ? face : kNoFlatFace;
   }
 
   const ClosedSurface& surface_;
   const std::vector<Index>& shell_;
-  const std::vector<Index>& sheet_;
   std::vector<Index> order_;
   std::vector<Node> nodes_;
 };
@@ -230,14 +192,13 @@ class WindingCheck {
   Pockets run() {
     check_shells();
     faults_.throw_if_any();
-    sheet_ = sheets_of(surface_, tolerance_);
     // Shells that bound solids and do not pass through themselves add up to no negative number,
     // wherever they pass through each other.
     if (all_bound_solids_ && are_simple()) return {};
     felt_ = felt_depth();
     at_pocket_.assign(surface_.triangles.size(), 0);
     shell_.assign(shell_.size(), 0);
-    tree_.emplace(surface_, shell_, sheet_);
+    tree_.emplace(surface_, shell_);
     // Over triangles that cross no others, the number does not change from one to its neighbour.
     // Where two cross, a region of a lower number begins outside both.
     find_crossings();
@@ -466,7 +427,7 @@ class WindingCheck {
   // Whether no shell passes through itself.
   bool are_simple() {
     in_shells_ = true;
-    tree_.emplace(surface_, shell_, sheet_);
+    tree_.emplace(surface_, shell_);
     find_crossings();
     in_shells_ = false;
     return budget_ > 0;
@@ -488,7 +449,9 @@ class WindingCheck {
     if (budget_ == 0) return;
     const Tree::Node &x = tree_->nodes()[a], &y = tree_->nodes()[b];
     if (in_shells_ && tree_->shells_apart(x, y)) return;
-    if (x.sheet == y.sheet && x.sheet != kNoSheet) return;
+    // Where a plane face lies on itself, its border does, and the triangles beyond the border are
+    // found there. Long triangles of a polygon with many corners all have boxes that meet.
+    if (x.face == y.face && x.face != kNoFlatFace) return;
     if (a != b && (!x.box.meets(y.box) || is_apart(x, y.box) || is_apart(y, x.box))) return;
     if (x.right == 0 && y.right == 0) {
       for (Index i = x.begin; i < x.end; ++i) {
@@ -619,7 +582,6 @@ class WindingCheck {
   std::optional<Tree> tree_;
   MeshFaults faults_;
   std::vector<Index> shell_;      ///< of each triangle, its first one
-  std::vector<Index> sheet_;      ///< of each triangle
   bool all_bound_solids_ = true;  ///< none is turned inwards
   bool in_shells_ = false;        ///< look only for shells that pass through themselves
   std::vector<char> crossed_;

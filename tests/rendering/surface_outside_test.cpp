@@ -23,6 +23,7 @@
 #include "tests/shared/probe_paths.h"
 #include "tests/shared/random_polyhedron.h"
 #include "tests/shared/rounds.h"
+#include "tests/stimuli/concave_solids.h"
 
 namespace palpate::rendering {
 namespace {
@@ -215,6 +216,12 @@ PolygonSoup folded_plate(Random& random) {
         return c.z == 1 && inside ? at + moved[static_cast<std::size_t>(c.x + (kCells + 1) * c.y)]
                                   : at;
       });
+}
+
+/// Its ends are fans or zigzags of slivers.
+PolygonSoup disk_of_slivers(Random& random) {
+  const auto corners = static_cast<std::uint32_t>(100 + random.below(300));
+  return stimuli::solids::notched_disk(corners, static_cast<stimuli::solids::Cut>(random.below(3)));
 }
 
 enum class Written { single_precision, six_decimals, eight_decimals };
@@ -535,6 +542,8 @@ INSTANTIATE_TEST_SUITE_P(
         Kind{"MountingPlate", mounting_plate, true, Written::eight_decimals},
         Kind{"AbuttingBlocks", abutting_blocks, true, Written::six_decimals},
         Kind{"EightCells", rounded_cube_of_eight_cells, true, Written::eight_decimals},
+        Kind{"DiskOfSlivers", disk_of_slivers, true, Written::single_precision},
+        Kind{"DiskAlongAxes", disk_of_slivers, false, Written::eight_decimals},
         Kind{"FoldedPlate", folded_plate, true, Written::eight_decimals}),
     [](const auto& kind) { return std::string(kind.param.name); });
 

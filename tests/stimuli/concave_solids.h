@@ -47,6 +47,57 @@ inline bool in_outline(const Outline& outline, double x, double y) {
   return in;
 }
 
+/// How the ends of a disk are cut into triangles: in a fan from its notch, from its middle, or in a
+/// zigzag from side to side.
+enum class Cut { from_notch, from_middle, zigzag };
+
+/// A disk of 30 mm with a notch, from z = 0 to 5 mm, of n corners.
+inline PolygonSoup notched_disk(std::uint32_t n, Cut cut) {
+  constexpr double kRadius = 0.03, kThick = 0.005;  // m
+  PolygonSoup soup;
+  for (const double z : {0.0, kThick}) {
+    for (std::uint32_t k = 0; k < n; ++k) {
+      const double angle = 2 * std::numbers::pi * k / n, radius = (k == 0 ? 0.9 : 1) * kRadius;
+      soup.vertices.emplace_back(radius * std::cos(angle), radius * std::sin(angle), z);
+    }
+  }
+  const auto cut_ends = [&](std::uint32_t a, std::uint32_t b, std::uint32_t c) {
+    soup.faces.push_back({n + a, n + b, n + c});
+    soup.faces.push_back({a, c, b});
+  };
+  for (std::uint32_t k = 0; k < n; ++k) {
+    const std::uint32_t next = (k + 1) % n;
+    soup.faces.push_back({k, next, n + next});
+    soup.faces.push_back({k, n + next, n + k});
+    if (cut == Cut::from_notch && k > 0 && next > 0) cut_ends(0, k, next);
+    if (cut != Cut::from_middle) continue;
+    soup.faces.push_back({2 * n, next, k});
+    soup.faces.push_back({2 * n + 1, n + k, n + next});
+  }
+  if (cut == Cut::from_middle) {
+    soup.vertices.emplace_back(0, 0, 0);
+    soup.vertices.emplace_back(0, 0, kThick);
+  }
+  if (cut != Cut::zigzag) return soup;
+  // From the notch to an eighth of the way round on both sides, then across.
+  std::uint32_t left = n / 8, right = n - left;
+  for (std::uint32_t k = 1; k < left; ++k) {
+    cut_ends(0, k, k + 1);
+    cut_ends(0, n - k - 1, n - k);
+  }
+  cut_ends(0, left, right);
+  for (bool on_left = true; left + 1 < right; on_left = !on_left) {
+    if (on_left) {
+      cut_ends(right, left, left + 1);
+      ++left;
+    } else {
+      cut_ends(right, left, right - 1);
+      --right;
+    }
+  }
+  return soup;
+}
+
 /// A prism on an outline in the xy plane, from z = 0 up. Its ends are one polygon each.
 inline Solid prism(const Outline& outline, double height) {
   Solid solid;

@@ -1,0 +1,27 @@
+#pragma once
+// Large plane faces of a closed surface, as CAD programs make them: a polygon of many corners, cut
+// into long slivers.
+
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+#include "stimuli/closed_surface.h"
+
+namespace palpate::stimuli {
+
+inline constexpr std::uint32_t kNoFlatFace = std::numeric_limits<std::uint32_t>::max();
+
+/// The plane face of each triangle, if 64 or more triangles make it, numbered from 0; else
+/// kNoFlatFace. Empty: there is none.
+/// \param tolerance  m; all corners of a face are within it of one plane
+std::vector<std::uint32_t> find_flat_faces(const ClosedSurface& surface, double tolerance);
+
+/// Cuts the plane faces (ClosedSurface::flat_face) anew, so that their triangles are short and what
+/// is near a place is few of them: as long as it makes it shorter, the edge between two triangles
+/// becomes the other diagonal of both. A fan of n triangles becomes a hierarchy of log n levels.
+/// Corners and outline stay, and so do triangles that may bound a pocket, and corners that rounding
+/// has moved away from the plane farther than a 64th of the new triangle's height.
+void cut_flat_faces_anew(ClosedSurface& surface);
+
+}  // namespace palpate::stimuli

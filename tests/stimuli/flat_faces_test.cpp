@@ -1,0 +1,135 @@
+#include "stimuli/flat_faces.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <glm/geometric.hpp>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "data/base/random.h"
+#include "stimuli/coplanar.h"
+#include "stimuli/orientation.h"
+#include "tests/shared/random_polyhedron.h"
+#include "tests/stimuli/concave_solids.h"
+
+namespace palpate::stimuli {
+namespace {
+
+using solids::Cut;
+using solids::notched_disk;
+
+struct FlatFace {
+  std::size_t triangles = 0;
+  double area = 0;          // m^2
+  double edges = 0;         // m, length of all edges inside
+  std::size_t largest = 0;  // triangles at a corner
+  std::set<std::pair<std::uint32_t, std::uint32_t>> outline;
+};
+
+std::map<std::uint32_t, FlatFace> faces_of(const ClosedSurface& surface) {
+  std::map<std::uint32_t, FlatFace> faces;
+  std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> at;
+  for (std::uint32_t t = 0; t < surface.flat_face.size(); ++t) {
+    if (surface.flat_face[t] == kNoFlatFace) continue;
+    FlatFace& face = faces[surface.flat_face[t]];
+    const auto& c = surface.triangles[t];
+    const auto place = [&](std::size_t k) { return surface.vertices[c[k % 3]]; };
+    ++face.triangles;
+    face.area += 0.5 * glm::length(glm::cross(place(1) - place(0), place(2) - place(0)));
+    for (std::size_t k = 0; k < 3; ++k) {
+      face.largest = std::max(face.largest, ++at[{surface.flat_face[t], c[k]}]);
+      if (surface.flat_face[surface.across[t][k]] == surface.flat_face[t]) {
+        face.edges += 0.5 * glm::distance(place(k), place(k + 1));
+      } else {
+        face.outline.insert({c[k], c[(k + 1) % 3]});
+      }
+    }
+  }
+  return faces;
+}
+
+// Every side has one neighbour, which runs the opposite way.
+bool is_linked(const ClosedSurface& surface) {
+  for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t other = surface.across[t][k];
+      bool back = false;
+      for (std::size_t j = 0; j < 3; ++j) {
+        back |= surface.across[other][j] == t &&
+                surface.triangles[other][j] == surface.triangles[t][(k + 1) % 3] &&
+                surface.triangles[other][(j + 1) % 3] == surface.triangles[t][k];
+      }
+      if (!back) return false;
+    }
+  }
+  return true;
+}
+
+class FlatFaces : public ::testing::TestWithParam<Cut> {};
+
+TEST_P(FlatFaces, DiskIsCutIntoAHierarchy) {
+  constexpr std::uint32_t kCorners = 1000;
+  const ClosedSurface surface = closed_surface(notched_disk(kCorners, GetParam())).surface;
+  EXPECT_TRUE(is_linked(surface));
+  const auto faces = faces_of(surface);
+  ASSERT_EQ(faces.size(), 2U);
+  for (const auto& [number, face] : faces) {
+    EXPECT_EQ(face.triangles, GetParam() == Cut::from_middle ? kCorners : kCorners - 2);
+    EXPECT_EQ(face.outline.size(), kCorners);
+    double twice = 0;
+    for (const auto& [from, to] : face.outline) {
+      const Vec3 &a = surface.vertices[from], &b = surface.vertices[to];
+      twice += a.x * b.y - a.y * b.x;
+    }
+    EXPECT_NEAR(face.area, 0.5 * std::abs(twice), 1e-12);
+    // A level of chords of a circle is as long as the circle; ten levels lead to the rim. A fan has
+    // 1000 triangles at a corner, and 30 m of edges.
+    EXPECT_LT(face.edges, 20 * 0.19);
+    EXPECT_LT(face.largest, 30U);
+  }
+}
+
+TEST_P(FlatFaces, RoundedDiskTurnedAnywhereIsFound) {
+  Random random(3);
+  for (int i = 0; i < 20; ++i) {
+    PolygonSoup soup = testing::placed(notched_disk(200, GetParam()), uniform_rotation(random), 1,
+                                       Vec3(0.01, 0, 0));
+    for (Vec3& v : soup.vertices) v = Vec3(glm::vec3(v));
+    soup.coordinate_error = 0.04 * 0x1p-24;
+    const ClosedSurface surface = closed_surface(soup).surface;
+    const auto faces = faces_of(surface);
+    ASSERT_EQ(faces.size(), 2U) << i;
+    for (const auto& [number, face] : faces) EXPECT_EQ(face.outline.size(), 200U);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Cuts, FlatFaces,
+                         ::testing::Values(Cut::from_notch, Cut::from_middle, Cut::zigzag));
+
+TEST(FlatFaces, FewOrBentTrianglesStayAsTheyAre) {
+  const ClosedSurface block = closed_surface(box(Vec3(0.1))).surface;
+  EXPECT_TRUE(block.flat_face.empty());
+  const ClosedSurface ball = closed_surface(icosphere(0.03, 4)).surface;
+  EXPECT_TRUE(ball.flat_face.empty());
+}
+
+TEST(FlatFaces, TrianglesAtPocketsStay) {
+  const PolygonSoup soup = notched_disk(100, Cut::from_middle);
+  ClosedSurface surface;
+  surface.vertices = soup.vertices;
+  for (const auto& face : soup.faces) surface.triangles.push_back({face[0], face[1], face[2]});
+  link_triangles(surface.vertices, surface.triangles, surface.across);
+  surface.flat_face = find_flat_faces(surface, 1e-12);
+  const auto before = surface.triangles;
+  ClosedSurface pockets = surface;
+  for (std::uint32_t t = 0; t < before.size(); ++t) pockets.at_pockets.push_back(t);
+  cut_flat_faces_anew(pockets);
+  EXPECT_EQ(pockets.triangles, before);
+  cut_flat_faces_anew(surface);
+  EXPECT_NE(surface.triangles, before);
+}
+
+}  // namespace
+}  // namespace palpate::stimuli
