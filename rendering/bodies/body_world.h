@@ -29,13 +29,13 @@ struct MovingBody {
   int object = 0;
   BodyInertia inertia;
   stimuli::Body of;
-  std::vector<CollidingPart> parts;  ///< empty: it is not convex, nor of convex parts
-  /// In its frame; null: it has parts and meets only such as have some.
+  std::vector<CollidingPart> parts;  ///< empty: neither convex nor made of convex parts
+  /// In its frame; null: it meets only bodies and obstacles that have parts.
   std::shared_ptr<const CollisionSurface> surface;
   double radius = 0;  ///< m, about the centre of mass
   BodyMotion start;
   Pose placed;           ///< where the scene put the body's frame
-  double stiffness = 0;  ///< N/m, of its surface; beyond limits refused
+  double stiffness = 0;  ///< N/m, of its surface
 };
 
 /// One object that stands still.
@@ -47,7 +47,7 @@ struct Obstacle {
   double radius = 0;
 };
 
-/// Two parts that may touch; of a pair that meets by its surfaces, the only one, without meaning.
+/// Two parts that may touch. A pair of surfaces has one without meaning.
 struct PartPair {
   std::uint32_t part_a = 0, part_b = 0;
 };
@@ -57,7 +57,7 @@ struct BodyPair {
   std::uint32_t a = 0;
   std::uint32_t b = 0;  ///< index of the body, or of the obstacle
   bool obstacle = false;
-  bool by_surface = false;             ///< not by convex parts
+  bool by_surface = false;             ///< meets by surfaces, not by convex parts
   std::uint32_t first = 0, count = 0;  ///< of the part pairs
   double restitution = 0, friction = 0;
 };
@@ -107,12 +107,12 @@ struct SleepState {
   Quat orientation{1, 0, 0, 0};
 };
 
-/// Where two bodies were when the distances of their parts were measured (GapMemory::least). While
-/// they have moved by less, parts that were far apart still are.
+/// Where two bodies were when the distances of their parts were measured (GapMemory::least). Parts
+/// farther apart than the bodies have moved since need no new measurement.
 struct PairPlaces {
   Vec3 centre_a, centre_b;
   Quat orientation_a{1, 0, 0, 0}, orientation_b{1, 0, 0, 0};
-  double least = -HUGE_VAL;  ///< m; no part of one was closer to any of the other
+  double least = -HUGE_VAL;  ///< m; their parts were at least this far apart
 };
 
 /// The state that a step changes and its working memory.
@@ -122,7 +122,7 @@ struct BodyWorldState {
   std::vector<PairPlaces> measured;  ///< of each pair
   std::vector<SleepState> sleep;
   std::size_t sleeping = 0;         ///< bodies
-  bool dropped = false;             ///< contacts or their friction were, since this was reset
+  bool dropped = false;             ///< a contact or its friction was dropped since the last reset
   std::uint64_t not_converged = 0;  ///< problems that reached the limit of pivots
 
   // Working memory. Copies of a state have none until they allocate it.
@@ -199,9 +199,8 @@ bool touches_nothing(const BodyWorld& world, BodyWorldState& state, std::uint32_
 // something comes near. Nothing here allocates.
 
 /// Call after a step. Bodies that touch each other fall asleep together once each has been at rest
-/// for half a second. Without gravity and damping, a body sleeps only if it has no momentum at all,
-/// so that none is lost.
-/// \param duration  s, of the step
+/// for half a second. Without gravity and damping, a body sleeps only with zero momentum, so that
+/// no momentum is lost. \param duration  s, of the step
 void fall_asleep(const BodyWorld& world, BodyWorldState& state, double duration);
 
 /// Wakes a body and those that fell asleep with it.

@@ -237,8 +237,8 @@ void MovingBodies::find_probe_contacts(BodiesState& state, std::size_t body,
 }
 
 /// Continues the contact of the last step if the probe is above its plane at the end of this one:
-/// within the step it still presses. A probe that is still below the plane and not about to leave
-/// it has passed the border of the touched face: the plane ends there, and so does the contact.
+/// it still presses within the step. If the probe is below the plane and is not leaving it, it has
+/// passed the border of the touched face, and the contact ends.
 void MovingBodies::continue_contact(BodiesState& state, const Stroke& stroke,
                                     std::size_t body) const {
   const BodiesState::Held& held = state.held[body];
@@ -303,9 +303,9 @@ void MovingBodies::place_contact(BodiesState& state, const Stroke& stroke, const
     const Vec3 spin = spin_of(world_.bodies[spring.body].inertia, motion);
     spring.closing =
         glm::dot(spring.normal, velocity_at(spin, motion, spring.place) - moved / stroke.duration);
-    // A depth that nobody has pressed must not hold energy: two parts that jam the probe between
-    // them can move the ideal tool by centimetres when they approach by micrometres. A body that
-    // the force hardly moves gets the full force.
+    // A depth that no work has made must not hold energy: two parts that jam the probe move the
+    // ideal tool by centimetres when they approach by micrometres. A body that the force hardly
+    // moves gets the full force.
     constexpr double kCreep = 0.01, kHardly = 0.01;  // m/s; m/s^2
     const double way = (spring.closing > 0 ? 2 : 1) * spring.closing + kCreep;
     const double pressed = state.held[spring.body].deepest + way * stroke.duration;
@@ -575,9 +575,9 @@ void MovingBodies::push_freely(BodiesState& state, ProbeContact& contact, double
 
 /// Corrects the energy of a body that leaves the probe. Its energy, with the spring's, must be its
 /// initial one plus the work of the hand and of weight since. The impulse corrects the errors of
-/// finite steps (some 1e-4, if the body turns on the probe), but no more: further differences come
-/// from the hand's path over edges and corners, and to correct those on a heavy body, which hardly
-/// moves, would take the whole force of a tick.
+/// finite steps (some 1e-4, if the body turns on the probe) alone. Other differences come from the
+/// hand's path over edges and corners; to correct them on a heavy body would take the whole force
+/// of a tick.
 void MovingBodies::balance(BodiesState& state, ProbeContact& contact, const Vec3& moment,
                            double duration) const {
   constexpr double kMostShare = 1e-2;  // of the speed: more is not an error of steps

@@ -64,8 +64,8 @@ class BodiesState final : public MotionState {
   std::vector<Rendering> felt;     ///< of each body, in its frame
   std::vector<Pose> shown;         ///< that frame
   std::vector<char> chosen;
-  /// Of each body, in its frame: the spring at the end of the last step. The next step continues it
-  /// if the probe has left the body by its end.
+  /// The spring on a body at the end of the last step, in the body's frame. The next step continues
+  /// it if the probe leaves the body within that step.
   struct Held {
     bool holds = false;
     ProbeContact contact;

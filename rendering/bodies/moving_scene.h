@@ -17,7 +17,7 @@ struct MovingObject {
   int object = 0;  ///< index; of SceneObject::object
   stimuli::Body body;
   Pose pose;  ///< of the object's frame
-  /// All of the object, in its frame, for its mass; null: what is felt of it, or its convex parts.
+  /// The whole object, in its frame, for its mass; null: use its felt surface, or its convex parts.
   std::shared_ptr<const Surface> solid = nullptr;
 };
 

@@ -55,8 +55,8 @@ class Solid {
   /// \param before  strains at its start
   /// \param rate  damping / duration of the step
   double energy(std::span<const Vec3> x, const Strains& before, double rate, Vec3* gradient) const;
-  /// A step's values at a trial, all at once: elastic energy, J, with its gradient (N, one for each
-  /// node) and strains (resized if they are not of this solid).
+  /// Values of a step at a trial, computed together: elastic energy, J, with its gradient (N, one
+  /// for each node) and strains (resized if they are not of this solid).
   struct Potential {
     double elastic = 0;  ///< J
     double damped = 0;   ///< J, with the incremental potential of damping

@@ -11,8 +11,8 @@
 
 namespace palpate::rendering {
 
-/// A servo's view of a soft body between two of its steps; all by surface node. With the load of
-/// the last step held, a node moves from x to x + ahead within a step.
+/// The servo's view of a soft body between two of its steps, by surface node. Under the load of the
+/// last step, a node moves from x to x + ahead within a step.
 struct SoftView {
   std::vector<Vec3> x, ahead;
   std::vector<Vec3> by_load;  ///< the part of a node's place due to the load, by the compliance
