@@ -79,14 +79,6 @@ struct Loads {
   Vec3 device2;  ///< N, at the tail
 };
 
-/// N m; the torque about another point, such as the hand: equation (3) of the same paper, with all
-/// contacts summed.
-/// \param torque  N m, about `from`
-inline Vec3 torque_about(const Vec3& point, const Vec3& torque, const Vec3& from,
-                         const Vec3& force) {
-  return torque + glm::cross(from - point, force);
-}
-
 /// The loads of one contact; device 1 is left at zero.
 /// \tparam kAlone  the only contact: without friction its shift is then along the force
 template <bool kSegment, bool kFriction, bool kAlone>

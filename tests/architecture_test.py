@@ -112,7 +112,7 @@ LOOKS_INSIDE = {"runner/evidence/accuracy", "runner/evidence/scenes", "runner/ev
 PUBLIC = {
     "stimuli": "closed_surface face_triangles shapes convex_mesh grid_hull inset large_array layers/layer_surface mesh_file nearest_on_triangle orientation polygon_soup "
                " parts/convex_parts primitives solids/solid_mesh texture vec",
-    "rendering": "field_demand fields first_contact probe reach render_fault renderer scene tool",
+    "rendering": "fields first_contact probe reach render_fault renderer scene tool",
     "rendering/bodies": "moving_scene",
     "runner/evidence/verification": "explain extreme_cases random_solids reference search surface_reference union_cases",
     "runner/evidence/scenes": "feature_costs scene_study stage_costs tick_costs",
@@ -137,7 +137,7 @@ PUBLIC = {
     "analysis/figures": "panel_drawing figures svg",
     "analysis/report": "coverage_report cue_report html_page hypotheses plan_record plan_report report study_report tables",
     "runner": "",
-    "runner/servo": "device force_limiter heard_tick passivity realtime ring sample servo servo_thread "
+    "runner/servo": "device field_demand force_limiter heard_tick passivity realtime ring sample servo servo_thread "
                     "shared_value tick_source touched_places triple_buffer",
     "runner/safety": "fault_signals guarded_device shared_memory",
     "runner/sound": "loopback player sound_output sound_source",

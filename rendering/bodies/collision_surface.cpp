@@ -274,10 +274,9 @@ std::vector<FeatureTree::Item> CollisionSurface::find_edges() {
   return items;
 }
 
-/// The directions along which a vertex is the farthest of its neighbours; untouched if there are
-/// none.
-/// \return whether they span a solid angle: else it lies on a flat place, a straight edge or in a
-/// hollow, and others touch with it or before it
+/// The directions along which a vertex is farther than its neighbours; unchanged if there are none.
+/// \return whether they span a solid angle; false: the vertex lies on a flat place, on a straight
+/// edge or in a hollow, and other features touch with it or before it
 bool CollisionSurface::directions_at(std::uint32_t vertex, DirectionCone& cone) const {
   std::vector<Vec3> rays;
   bool convex = true;

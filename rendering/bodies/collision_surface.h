@@ -24,11 +24,11 @@ struct DirectionCone {
   static DirectionCone around(const DirectionCone& a, const DirectionCone& b);
   /// Whether some direction of this cone may be opposite to one of the other.
   /// \param other_axis  its axis in the frame of this one
-  /// \param turn  rad, small; by so much they may miss each other
+  /// \param turn  rad, small; the angle by which they may miss each other
   bool may_oppose(const DirectionCone& other, const Vec3& other_axis, double turn) const;
 };
 
-/// A tree of boxes over some features, each with the cone of all directions of what it holds.
+/// A tree of boxes over features. Each box has the cone of all directions of its features.
 class FeatureTree {
  public:
   struct Node {
@@ -58,8 +58,8 @@ class FeatureTree {
 /// Immutable.
 class CollisionSurface {
  public:
-  /// Triangles, counter-clockwise seen from outside; equal corners have equal numbers. Where
-  /// several closed shells overlap, each of them collides.
+  /// Triangles, counter-clockwise seen from outside; equal corners have equal numbers. Overlapping
+  /// closed shells collide each by themselves.
   CollisionSurface(std::vector<Vec3> vertices,
                    const std::vector<std::array<std::uint32_t, 3>>& triangles);
   /// \param pose  of its frame in that of the body

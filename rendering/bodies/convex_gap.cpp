@@ -295,7 +295,7 @@ void clip_to(const ConvexPlace& part, const stimuli::Facet& facet, ClipRoom& roo
   }
 }
 
-/// Chooses a few points that support as well as all: the nearest, and the farthest to four sides.
+/// Keeps the points that support like all of them: the nearest, and the farthest to four sides.
 void choose_points(const ClipRoom& room, const Vec3& normal, Manifold& out) {
   const std::vector<ManifoldPoint>& all = room.points;
   if (all.size() <= 4) {

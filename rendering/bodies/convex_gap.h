@@ -31,14 +31,14 @@ struct GapMemory {
   std::uint32_t support_a = 0, support_b = 0;
   std::array<std::array<std::uint32_t, 2>, 3> nearest{};  ///< vertices of the last simplex
   std::uint32_t nearest_count = 0;
-  double least = -HUGE_VAL;  ///< m; they were not closer at PairPlaces
+  double least = -HUGE_VAL;  ///< m; they were at least this far apart at PairPlaces
 };
 
 /// A slab between two parts.
 struct Gap {
   Vec3 normal;          ///< unit, from a to b
   double distance = 0;  ///< between the planes that touch a and b; negative: overlap
-  Vec3 on_a, on_b;      ///< the nearest points, if they are apart by less than `enough`
+  Vec3 on_a, on_b;      ///< the nearest points, if closer than `enough`
 };
 
 /// The slab of largest distance. Gilbert, Johnson & Keerthi 1988, with both parts shrunk by 1e-4

@@ -175,7 +175,7 @@ class GapSearch {
     add_along(0.5 * (p + s * u + q + t * v), normal, gap);
   }
 
-  /// Whether a face lies between a place and the one on the surface that it may have come through.
+  /// Whether a face lies between a place and its possible entry on the surface.
   static bool hidden(const CollisionSurface& surface, const Vec3& from, const Vec3& along) {
     bool hides = false;
     surface.crossings(from, along, [&](double t, std::uint32_t) { hides |= t < 1 - 1e-6; });
@@ -254,8 +254,8 @@ Vec3 middle_under(const CollisionSurface& surface, const CollisionSurface::Face&
   return point + 0.5 * first * along;
 }
 
-/// The deepest place inside another surface of corners, pieces of edges, middles of faces, and of
-/// the solid under these: surfaces may coincide.
+/// The depth of the deepest corner, piece of an edge or middle of a face inside another surface.
+/// Surfaces may coincide, so the middles of the solid under faces count as well.
 double depth_inside(const SurfacePlace& a, const SurfacePlace& b) {
   const Mat3 back = glm::transpose(b.axes), axes = back * a.axes;
   const Vec3 position = back * (a.position - b.position);

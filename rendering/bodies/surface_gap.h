@@ -11,8 +11,8 @@ namespace palpate::rendering {
 
 /// What is looked at, m.
 struct GapLimits {
-  double reach = 0;     ///< farther apart is of no interest
-  double depth = 1e-3;  ///< corners and edges that are deeper inside the other surface are not seen
+  double reach = 0;     ///< places farther apart are left out
+  double depth = 1e-3;  ///< corners and edges deeper inside the other surface are left out
 };
 
 /// A surface at its present place.
@@ -33,7 +33,7 @@ struct NearPlace {
 struct NearPlaces {
   static constexpr std::size_t kMost = 4096, kMostChosen = 32;
   std::vector<NearPlace> all, chosen;
-  bool dropped = false;  ///< there were more
+  bool dropped = false;  ///< places did not fit and were left out
 
   void make_room();
 };
@@ -51,8 +51,8 @@ double gap_between(const SurfacePlace& a, const SurfacePlace& b, const GapLimits
 double find_places(const SurfacePlace& a, const SurfacePlace& b, const GapLimits& limits,
                    double turn, NearPlaces& out);
 
-/// m; how deep the surfaces are inside each other: of corners, pieces of edges, middles of faces
-/// and of the solid under these the one deepest inside the other. 0: they do not overlap. Slow.
+/// m; the depth of the deepest of these places inside the other surface: corners, pieces of edges,
+/// middles of faces and of the solid under them. 0: they do not overlap. Slow.
 double overlap_of(const SurfacePlace& a, const SurfacePlace& b);
 
 }  // namespace palpate::rendering

@@ -12,6 +12,7 @@
 #include "data/files/utc.h"
 #include "protocols/schedule.h"
 #include "protocols/tasks/levels.h"
+#include "runner/servo/field_demand.h"
 #include "runner/session/effect_check.h"
 
 namespace palpate::runner::session {
@@ -524,8 +525,8 @@ std::vector<std::string> incompatibilities(const protocols::Protocol& protocol,
     if (!refused && !stimulus.object.fields.empty()) {
       stimuli::Material all = felt_material(stimulus.object);
       if (!surface) all.stiffness = all.damping = 0;
-      const rendering::FieldDemand demand =
-          rendering::demand_of(stimulus.object.fields, rate, device.resolution);
+      const servo::FieldDemand demand =
+          servo::demand_of(stimulus.object.fields, rate, device.resolution);
       all.stiffness += demand.stiffness;
       all.damping = std::abs(all.damping) + demand.damping;
       check_material(all, "with its /fields ");

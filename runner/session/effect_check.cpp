@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "rendering/fields.h"
+#include "runner/servo/field_demand.h"
 #include "stimuli/texture.h"
 
 namespace palpate::runner::session {
@@ -81,7 +82,7 @@ std::vector<std::string> effect_notes(const stimuli::ObjectSpec& object,
   }
   for (std::size_t i = 0; i < object.fields.size(); ++i) {
     const stimuli::FieldSpec& field = object.fields[i];
-    const rendering::FieldDemand one = rendering::demand_of({field}, rate, kUsualResolution);
+    const servo::FieldDemand one = servo::demand_of({field}, rate, kUsualResolution);
     if (one.noise > kLeastNoise) {
       out.push_back(sentence(at_field(i, "low_pass_s"), ": a step of ", kUsualResolution,
                              " m of the position gives ", one.noise,

@@ -4,7 +4,6 @@
 #include <string>
 #include <vector>
 
-#include "rendering/field_demand.h"
 #include "runner/servo/device.h"
 #include "stimuli/shapes.h"
 

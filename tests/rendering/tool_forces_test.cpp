@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
+#include <glm/geometric.hpp>
 
 #include "rendering/contact.h"
 #include "rendering/renderer.h"
@@ -41,7 +42,7 @@ TEST(ToolForces, SplitOnTwoDevicesAndTurnTheHand) {
         Vec3 of_contacts(0);
         for (const PlacedContact& c : state.unions.contacts)
           of_contacts += glm::cross(c.place - hand, c.loaded.force * c.loaded.contact.normal);
-        const Vec3 told = torque_about(hand, r.torque, probe.tip, r.force);
+        const Vec3 told = r.torque + glm::cross(probe.tip - hand, r.force);
         ASSERT_LE(glm::length(told - of_contacts), 1e-9 * (1 + glm::length(told)));
         const Vec3 shown =
             glm::cross(probe.tip - hand, r.device1) + glm::cross(probe.tail - hand, r.device2);

@@ -12,6 +12,7 @@
 #include "protocols/parse.h"
 #include "protocols/protocol.h"
 #include "runner/scene_builder.h"
+#include "runner/servo/field_demand.h"
 #include "runner/session/device_check.h"
 #include "runner/session/effect_check.h"
 #include "stimuli/polygon_soup.h"
@@ -205,11 +206,11 @@ TEST(EffectCheck, ViscousNeedsTheDampingOfTheory) {
                                          {0.005, 0.0909091},
                                          {0.01, 0.0476190}}) {
     viscous.low_pass = low_pass;
-    EXPECT_NEAR(rendering::demand_of({viscous}, 1000, 0).damping, needed, 1e-6);
+    EXPECT_NEAR(servo::demand_of({viscous}, 1000, 0).damping, needed, 1e-6);
   }
   viscous.damping = Mat3(15);
   viscous.low_pass = 0.002;
-  EXPECT_NEAR(rendering::demand_of({viscous}, 1000, 3e-5).noise, 0.15, 1e-12);
+  EXPECT_NEAR(servo::demand_of({viscous}, 1000, 3e-5).noise, 0.15, 1e-12);
 }
 
 std::vector<std::string> reasons(const std::string& object) {

@@ -621,7 +621,7 @@ class SoftMotion final : public SceneMotion {
 
  private:
   /// Decides which steps arrive in a tick of dt.
-  /// \return kSoftLate: some are due, and none arrives
+  /// \return kSoftLate: a step was due and none arrived
   std::uint32_t pace(SoftMotionState& state, double dt) const noexcept {
     bool due = false, late = state.hold;
     for (std::size_t i = 0; i < soft_.size(); ++i) {

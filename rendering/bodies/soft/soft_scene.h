@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "rendering/bodies/soft/soft_body.h"
+#include "rendering/bodies/soft/soft_surface.h"
 #include "rendering/scene.h"
 #include "rendering/tool.h"
 #include "stimuli/polygon_soup.h"
@@ -345,8 +346,8 @@ void for_each_soft_contact(const RenderState& state, Visit visit) noexcept {
 /// later one. All due steps arrive together, or none if one is not ready (fault kSoftLate).
 void pace_by_tick(RenderState& state);
 
-/// Call before a tick of a state paced by tick: due steps wait. Held in the ticks with the fault
-/// kSoftLate, a recorded path gives the same result. No allocation.
+/// Makes due steps wait in the next tick of a state paced by tick. A replay that holds the ticks
+/// with the fault kSoftLate gives the recorded result. No allocation.
 void hold_steps(RenderState& state, bool held) noexcept;
 
 /// The same as pace_by_tick, with steps made elsewhere. Call right after initial_state().

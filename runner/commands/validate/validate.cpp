@@ -16,12 +16,12 @@
 #include "protocols/session_plan.h"
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/texts.h"
-#include "rendering/field_demand.h"
 #include "runner/commands/shared/command.h"
 #include "runner/devices/device_delay.h"
 #include "runner/devices/registry.h"
 #include "runner/devices/simulated.h"
 #include "runner/serve/served_scene.h"
+#include "runner/servo/field_demand.h"
 #include "runner/session/device_check.h"
 #include "runner/session/effect_check.h"
 #include "runner/session/simulated_study.h"
@@ -208,8 +208,8 @@ void add_faults(const stimuli::ObjectSpec& object, const std::string& place,
   if (object.shape != stimuli::ShapeKind::none) add_buzzing(object, place, shown, device, reasons);
   for (const std::string& fault : session::effect_faults(object, shown.servo_rate, device))
     reasons.push_back(place + fault);
-  const rendering::FieldDemand demand =
-      rendering::demand_of(object.fields, shown.servo_rate, device.resolution);
+  const servo::FieldDemand demand =
+      servo::demand_of(object.fields, shown.servo_rate, device.resolution);
   stimuli::Material fields;
   fields.stiffness = demand.stiffness;
   fields.damping = demand.damping;

@@ -7,9 +7,9 @@
 #include <numbers>
 #include <optional>
 
-#include "rendering/field_demand.h"
 #include "rendering/renderer.h"
 #include "runner/scene_builder.h"
+#include "runner/servo/field_demand.h"
 
 namespace palpate::runner::evidence {
 namespace {
@@ -146,7 +146,7 @@ void add_fields(std::vector<Case>& out) {
       one.object.fields = {field};
       one.velocity = {0.1, 0, 0};
       one.mass = 0.005;
-      one.theory = rendering::demand_of({field}, 1 / kPeriod, 0).damping;
+      one.theory = servo::demand_of({field}, 1 / kPeriod, 0).damping;
       out.push_back(one);
     }
   }

@@ -18,7 +18,7 @@ struct EffectStability {
 /// Sines of 0.1 and 0.4 mm on 1, 2 and 4 mm, pressed with 0.5 and 2 N; viscous and curl fields with
 /// low passes of 0, 2 and 10 ms; knocks. 800 N/m, 1 kHz, forces within the same tick. The theory of
 /// a texture and a knock is that of the material alone, K T / 2 (Colgate & Schenkel 1997); of
-/// fields see rendering::demand_of.
+/// fields see servo::demand_of.
 std::vector<EffectStability> effect_stability();
 
 /// A table of them, and a sentence.

@@ -7,6 +7,7 @@
 #include <glm/geometric.hpp>
 
 #include "data/base/random.h"
+#include "rendering/bodies/body_meetings.h"
 #include "rendering/bodies/body_world.h"
 #include "rendering/probe.h"
 #include "runner/evidence/tick_meters.h"
@@ -263,8 +264,8 @@ TEST(BodyContact, RememberedDistancesHideNoContact) {
       known.make_room();
       fresh.motion = known.motion;
       constexpr double kFar = 2e-3;
-      BodyContacts(world, known).find(0, kFar);
-      BodyContacts(world, fresh).find(0, kFar);
+      BodyMeetings(world, known).find(0, kFar);
+      BodyMeetings(world, fresh).find(0, kFar);
       const auto gap_in = [](const BodyWorldState& of, std::uint32_t parts) {
         for (const auto& near : of.near_parts) {
           if (near.parts == parts) return near.gap;

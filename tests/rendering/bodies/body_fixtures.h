@@ -2,11 +2,14 @@
 // Bodies and scenes for tests.
 
 #include <cmath>
+#include <cstddef>
+#include <glm/geometric.hpp>
 #include <memory>
 #include <utility>
 #include <vector>
 
 #include "rendering/bodies/body_world.h"
+#include "rendering/bodies/moving_bodies.h"
 #include "rendering/bodies/moving_scene.h"
 #include "rendering/bodies/rigid_motion.h"
 #include "rendering/renderer.h"
@@ -69,6 +72,31 @@ inline const BodyWorld& body_world_of(const Scene& scene) {
 }
 inline const BodyWorldState& body_state_of(const RenderState& state) {
   return static_cast<const BodiesState&>(*state.motion.get()).world;
+}
+
+/// Energy (J) and momenta (SI units) of all bodies; angular about the origin.
+inline double kinetic_energy(const BodyWorld& world, const BodyWorldState& state) {
+  double sum = 0;
+  for (std::size_t i = 0; i < world.bodies.size(); ++i)
+    sum += kinetic_energy(world.bodies[i].inertia, state.motion[i]);
+  return sum;
+}
+
+inline Vec3 momentum(const BodyWorld& world, const BodyWorldState& state) {
+  Vec3 sum(0);
+  for (std::size_t i = 0; i < world.bodies.size(); ++i)
+    sum += world.bodies[i].inertia.mass * state.motion[i].velocity;
+  return sum;
+}
+
+inline Vec3 angular_momentum(const BodyWorld& world, const BodyWorldState& state) {
+  Vec3 sum(0);
+  for (std::size_t i = 0; i < world.bodies.size(); ++i) {
+    const BodyMotion& motion = state.motion[i];
+    sum += motion.spin_momentum +
+           world.bodies[i].inertia.mass * glm::cross(motion.centre, motion.velocity);
+  }
+  return sum;
 }
 
 /// A probe far from everything.

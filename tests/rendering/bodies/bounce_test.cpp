@@ -10,6 +10,7 @@
 
 #include "data/base/random.h"
 #include "rendering/bodies/body_world.h"
+#include "rendering/bodies/one_sided_spring.h"
 #include "tests/rendering/bodies/body_fixtures.h"
 
 namespace palpate::rendering::test {

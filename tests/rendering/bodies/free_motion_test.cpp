@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "rendering/bodies/body_world.h"
+#include "rendering/bodies/one_sided_spring.h"
 #include "rendering/bodies/rigid_motion.h"
 #include "tests/rendering/bodies/body_fixtures.h"
 

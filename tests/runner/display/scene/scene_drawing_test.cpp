@@ -144,7 +144,7 @@ TEST(TorqueTest, OfTheDevicesEqualsThatOfTheContactsExceptTorsion) {
   moment.sample.device2 = r.device2;
   const LineProbe& probe = moment.sample.probe;
   const Vec3 hand = 0.5 * (probe.tip + probe.tail), axis = glm::normalize(probe.tail - probe.tip);
-  const Vec3 whole = rendering::torque_about(hand, r.torque, probe.tip, r.force);
+  const Vec3 whole = r.torque + glm::cross(probe.tip - hand, r.force);
   EXPECT_LT(glm::distance(torque_on_hand(moment), whole - glm::dot(whole, axis) * axis), 1e-12);
 }
 

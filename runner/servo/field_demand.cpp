@@ -1,4 +1,4 @@
-#include "rendering/field_demand.h"
+#include "runner/servo/field_demand.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include "rendering/fields.h"
 
-namespace palpate::rendering {
+namespace palpate::runner::servo {
 namespace {
 
 using DemandedKind = stimuli::FieldSpec::Kind;
@@ -27,7 +27,8 @@ double curl_demand(double damping, double low_pass, double period) {
   for (int i = 1; i < kTurns; ++i) {
     const double turn = std::numbers::pi * i / kTurns / period;
     const double seen = std::sin(0.5 * turn * period) / (0.5 * turn * period);
-    most = std::max(most, curl_power(damping, 1, turn, period, low_pass) / (seen * seen));
+    most =
+        std::max(most, rendering::curl_power(damping, 1, turn, period, low_pass) / (seen * seen));
   }
   return most;
 }
@@ -38,7 +39,7 @@ FieldDemand demand_of(const std::vector<stimuli::FieldSpec>& fields, double rate
                       double resolution) {
   FieldDemand out;
   for (const stimuli::FieldSpec& field : fields) {
-    const double alpha = low_pass_share(1 / rate, field.low_pass);
+    const double alpha = rendering::low_pass_share(1 / rate, field.low_pass);
     if (field.kind == DemandedKind::spring || field.kind == DemandedKind::channel)
       out.stiffness += field.stiffness;
     if (field.kind != DemandedKind::viscous && field.kind != DemandedKind::curl) continue;
@@ -53,4 +54,4 @@ FieldDemand demand_of(const std::vector<stimuli::FieldSpec>& fields, double rate
   return out;
 }
 
-}  // namespace palpate::rendering
+}  // namespace palpate::runner::servo

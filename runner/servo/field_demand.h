@@ -5,7 +5,7 @@
 
 #include "stimuli/shapes.h"
 
-namespace palpate::rendering {
+namespace palpate::runner::servo {
 
 /// Of an object's fields together, at one of its points.
 struct FieldDemand {
@@ -22,4 +22,4 @@ struct FieldDemand {
 FieldDemand demand_of(const std::vector<stimuli::FieldSpec>& fields, double rate,
                       double resolution);
 
-}  // namespace palpate::rendering
+}  // namespace palpate::runner::servo
