@@ -157,7 +157,7 @@ class Recutting {
         }
       }
       std::ranges::sort(next);
-      next.erase(std::ranges::unique(next).begin(), next.end());
+      next.erase(std::unique(next.begin(), next.end()), next.end());
       open.swap(next);
     }
   }

@@ -128,7 +128,7 @@ TEST(TexturedScene, TouchingObjectsKeepTheirOwn) {
 
 /// An L of two blocks as a closed mesh: its upper face at z = 0.01 is whole.
 std::string corner_mesh(const std::string& folder) {
-  const std::string file = folder + "/corner.obj";
+  std::string file = folder + "/corner.obj";
   std::ofstream out(file);
   // The outline in x and z, drawn out along y: a step down at x = 0.02.
   const double outline[][2] = {{-0.04, -0.01}, {0.04, -0.01}, {0.04, 0},

@@ -204,8 +204,9 @@ inline std::vector<PolygonSoup> torus_sections(double ring, double tube, int aro
     std::vector<std::uint32_t> near, far;
     for (int end = 0; end < 2; ++end) {
       for (int j = 0; j < corners; ++j)
-        section.vertices.push_back(
-            whole.vertices[static_cast<std::size_t>((i + end) % around * corners + j)]);
+        section.vertices.push_back(whole.vertices[static_cast<std::size_t>((i + end) % around) *
+                                                      static_cast<std::size_t>(corners) +
+                                                  static_cast<std::size_t>(j)]);
     }
     for (int j = 0; j < corners; ++j) {
       const auto a = static_cast<std::uint32_t>(j),

@@ -202,8 +202,7 @@ TEST(BodyContact, MomentumStaysWhateverHappens) {
     BodyScene s;
     const double restitution = trial % 3 == 0 ? 1 : 0.4;
     for (int i = 0; i < 6; ++i) {
-      const Vec3 place(0.12 * (i % 3), 0.12 * static_cast<double>(i / 3),
-                       between(random, -0.02, 0.02));
+      const Vec3 place(0.12 * (i % 3), i < 3 ? 0 : 0.12, between(random, -0.02, 0.02));
       const Mesh mesh =
           i % 2 == 0 ? box_mesh({0.08, 0.05, 0.06}) : mesh_of(stimuli::icosphere(0.03, 2));
       const Quat q = glm::normalize(
@@ -245,7 +244,7 @@ TEST(BodyContact, RememberedDistancesHideNoContact) {
   for (int trial = 0; trial < 4; ++trial) {
     BodyScene s;
     for (int i = 0; i < 6; ++i) {
-      const Vec3 place(0.12 * (i % 3), 0.12 * static_cast<double>(i / 3), 0.01 * i);
+      const Vec3 place(0.12 * (i % 3), i < 3 ? 0 : 0.12, 0.01 * i);
       const Quat q = glm::normalize(
           Quat(between(random, -1, 1), between(random, -1, 1), between(random, -1, 1), 0.3));
       stimuli::Body& body = s.moves(

@@ -68,6 +68,7 @@ TEST(CameraTest, FittedPointsAreInThePictureAndFillIt) {
     camera.resize(640, k % 2 == 0 ? 360 : 900);
     camera.look_from(3 * any(generator), 1.4F * any(generator));
     std::vector<glm::vec3> points;
+    points.reserve(12);
     const float size = std::pow(10.0F, any(generator));
     for (int i = 0; i < 12; ++i)
       points.emplace_back(size * any(generator), 2 * size * any(generator),
