@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "rendering/surface_search.h"
-#include "stimuli/flat_faces.h"
 
 namespace palpate::rendering {
 namespace {

@@ -13,6 +13,8 @@
 
 namespace palpate::stimuli {
 
+inline constexpr std::uint32_t kNoFlatFace = 0xffffffff;  ///< of ClosedSurface::flat_face
+
 /// Every side of a triangle has one neighbour, which runs along it the opposite way. The solid is
 /// where the surface winds round a point a positive number of times. It winds round a point a
 /// negative number of times only in pockets that no hand can feel.
@@ -26,7 +28,8 @@ struct ClosedSurface {
   double coordinate_error = 0;  ///< m, of each coordinate as its file rounds it; 0: not rounded
   /// Triangles that may bound a pocket, or a part of each does: there is no solid behind that part.
   std::vector<std::uint32_t> at_pockets = {};
-  /// Of each triangle, as of find_flat_faces (flat_faces.h). Empty: no face is large and plane.
+  /// Of each triangle, the large plane face that it is part of (flat_faces.h), numbered from 0, or
+  /// kNoFlatFace. Empty: there is no such face.
   std::vector<std::uint32_t> flat_face = {};
 };
 

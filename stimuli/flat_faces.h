@@ -3,14 +3,11 @@
 // into long slivers.
 
 #include <cstdint>
-#include <limits>
 #include <vector>
 
 #include "stimuli/closed_surface.h"
 
 namespace palpate::stimuli {
-
-inline constexpr std::uint32_t kNoFlatFace = std::numeric_limits<std::uint32_t>::max();
 
 /// The plane face of each triangle, if 64 or more triangles make it, numbered from 0; else
 /// kNoFlatFace. Empty: there is none.
