@@ -21,10 +21,12 @@
 #include "stimuli/primitives.h"
 #include "tests/shared/random_polyhedron.h"
 #include "tests/stimuli/concave_solids.h"
+#include "tests/stimuli/mesh_invariants.h"
 
 namespace palpate::stimuli {
 namespace {
 
+using checks::expect_closed;
 using testing::placed;
 using testing::triangulated;
 
@@ -33,34 +35,6 @@ TriangleSurface places_of(const ClosedSurface& surface) {
   for (const auto& t : surface.triangles)
     triangles.push_back({surface.vertices[t[0]], surface.vertices[t[1]], surface.vertices[t[2]]});
   return triangles;
-}
-
-// The header's guarantees for every surface.
-void expect_closed(const ClosedSurface& surface) {
-  std::vector<char> used(surface.vertices.size(), 0);
-  ASSERT_EQ(surface.across.size(), surface.triangles.size());
-  for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
-    const auto& corners = surface.triangles[t];
-    const Vec3 area = glm::cross(surface.vertices[corners[1]] - surface.vertices[corners[0]],
-                                 surface.vertices[corners[2]] - surface.vertices[corners[0]]);
-    EXPECT_GT(glm::length(area), 0) << t;
-    for (std::size_t k = 0; k < 3; ++k) {
-      used.at(corners[k]) = 1;
-      const std::uint32_t n = surface.across[t][k];
-      const auto& other = surface.triangles.at(n);
-      const std::uint32_t from = corners[(k + 1) % 3], to = corners[k];
-      bool back = false;
-      for (std::size_t j = 0; j < 3; ++j)
-        back |= other[j] == from && other[(j + 1) % 3] == to && surface.across[n][j] == t;
-      EXPECT_TRUE(back) << t << " over " << k;
-    }
-  }
-  EXPECT_EQ(std::count(used.begin(), used.end(), 0), 0);
-  const auto before = [](const Vec3& a, const Vec3& b) {
-    return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
-  };
-  std::set<Vec3, decltype(before)> places(surface.vertices.begin(), surface.vertices.end(), before);
-  EXPECT_EQ(places.size(), surface.vertices.size());
 }
 
 double volume_in(const ClosedSurface& surface) { return bulk_of(places_of(surface)).volume; }
@@ -481,8 +455,9 @@ TEST(ClosedSurfaceTest, TakesManyBarsThatPassThroughEachOther) {
   PolygonSoup soup;
   for (int axis = 0; axis < 3; ++axis) {
     for (int i = 0; i < kBars * kBars; ++i) {
+      const int row = i / kBars;
       Vec3 at(0), size(0.0005);
-      at[(axis + 1) % 3] = 0.001 * (i / kBars);
+      at[(axis + 1) % 3] = 0.001 * row;
       at[(axis + 2) % 3] = 0.001 * (i % kBars);
       at[axis] = 0.0195;
       size[axis] = 0.041;
