@@ -107,8 +107,8 @@ class FlatFaceSearch {
 
 /// Exchanges diagonals.
 class Recutting {
-  // Height of a new triangle, times what rounding leaves between the corners of its face: it is not
-  // tilted by more than a degree.
+  // Least height of a new triangle, times the unevenness that rounding leaves in its face. So it is
+  // tilted by less than a degree.
   static constexpr double kSlope = 64;
 
  public:
@@ -180,6 +180,7 @@ class Recutting {
   bool exchange(std::uint32_t t, std::uint32_t k, std::uint32_t other) {
     constexpr double kShorter = 1 - 1e-9;  // of the length, squared
     constexpr double kNarrow = 1e-9;       // height of the length
+    constexpr double kSliver = 0.25;       // the same; others stay as their file has them
     const auto left = surface_.triangles[t], right = surface_.triangles[other];
     const auto by_left = surface_.across[t], by_right = surface_.across[other];
     const std::uint32_t a = left[k], b = left[(k + 1) % 3], c = left[(k + 2) % 3];
@@ -195,6 +196,10 @@ class Recutting {
       return false;
     }
     const Vec3& normal = normals_[surface_.flat_face[t]];
+    const auto above = [&](const Vec3& apex) {  // times the length, of a triangle on a b
+      return std::abs(glm::dot(normal, glm::cross(now, apex - at(a))));
+    };
+    if (std::min(above(at(c)), above(at(d))) > kSliver * glm::dot(now, now)) return false;
     if (!(glm::dot(normal, glm::cross(at(a) - at(c), then)) > least) ||
         !(glm::dot(normal, glm::cross(then, at(b) - at(c))) > least)) {
       return false;

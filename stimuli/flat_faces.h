@@ -15,10 +15,11 @@ namespace palpate::stimuli {
 std::vector<std::uint32_t> find_flat_faces(const ClosedSurface& surface, double tolerance);
 
 /// Cuts the plane faces (ClosedSurface::flat_face) anew, so that their triangles are short and what
-/// is near a place is few of them: as long as it makes it shorter, the edge between two triangles
-/// becomes the other diagonal of both. A fan of n triangles becomes a hierarchy of log n levels.
-/// Corners and outline stay, and so do triangles that may bound a pocket, and corners that rounding
-/// has moved away from the plane farther than a 64th of the new triangle's height.
+/// is near a place is few of them: as long as it makes it shorter, the edge between a sliver and
+/// its neighbour becomes the other diagonal of both. A fan of n triangles becomes a hierarchy of
+/// log n levels. Corners and outline stay. Triangles that may bound a pocket stay, and so do those
+/// whose other cut would be less than 64 times as high as the unevenness that rounding leaves in
+/// the face.
 void cut_flat_faces_anew(ClosedSurface& surface);
 
 }  // namespace palpate::stimuli

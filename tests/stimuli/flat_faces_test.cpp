@@ -13,6 +13,7 @@
 #include "stimuli/orientation.h"
 #include "tests/shared/random_polyhedron.h"
 #include "tests/stimuli/concave_solids.h"
+#include "tests/stimuli/mesh_invariants.h"
 
 namespace palpate::stimuli {
 namespace {
@@ -50,29 +51,12 @@ std::map<std::uint32_t, FlatFace> faces_of(const ClosedSurface& surface) {
   return faces;
 }
 
-// Every side has one neighbour, which runs the opposite way.
-bool is_linked(const ClosedSurface& surface) {
-  for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint32_t other = surface.across[t][k];
-      bool back = false;
-      for (std::size_t j = 0; j < 3; ++j) {
-        back |= surface.across[other][j] == t &&
-                surface.triangles[other][j] == surface.triangles[t][(k + 1) % 3] &&
-                surface.triangles[other][(j + 1) % 3] == surface.triangles[t][k];
-      }
-      if (!back) return false;
-    }
-  }
-  return true;
-}
-
 class FlatFaces : public ::testing::TestWithParam<Cut> {};
 
 TEST_P(FlatFaces, DiskIsCutIntoAHierarchy) {
   constexpr std::uint32_t kCorners = 1000;
   const ClosedSurface surface = closed_surface(notched_disk(kCorners, GetParam())).surface;
-  EXPECT_TRUE(is_linked(surface));
+  checks::expect_closed(surface);
   const auto faces = faces_of(surface);
   ASSERT_EQ(faces.size(), 2U);
   for (const auto& [number, face] : faces) {
@@ -96,10 +80,11 @@ TEST_P(FlatFaces, RoundedDiskTurnedAnywhereIsFound) {
   for (int i = 0; i < 20; ++i) {
     PolygonSoup soup = testing::placed(notched_disk(200, GetParam()), uniform_rotation(random), 1,
                                        Vec3(0.01, 0, 0));
-    for (Vec3& v : soup.vertices) v = Vec3(glm::vec3(v));
+    for (Vec3& v : soup.vertices) v = checks::single_precision(v);
     soup.coordinate_error = 0.04 * 0x1p-24;
     const ClosedSurface surface = closed_surface(soup).surface;
     const auto faces = faces_of(surface);
+    checks::expect_closed(surface);
     ASSERT_EQ(faces.size(), 2U) << i;
     for (const auto& [number, face] : faces) EXPECT_EQ(face.outline.size(), 200U);
   }
@@ -113,6 +98,46 @@ TEST(FlatFaces, FewOrBentTrianglesStayAsTheyAre) {
   EXPECT_TRUE(block.flat_face.empty());
   const ClosedSurface ball = closed_surface(icosphere(0.03, 4)).surface;
   EXPECT_TRUE(ball.flat_face.empty());
+}
+
+// A cube, its faces grids of right triangles.
+TEST(FlatFaces, TidyTrianglesStayAsTheFileHasThem) {
+  constexpr std::uint32_t kSide = 12;
+  constexpr double kUnit = 0.05 / kSide;  // m
+  PolygonSoup soup;
+  for (int axis = 0; axis < 3; ++axis) {
+    for (const double side : {-1.0, 1.0}) {
+      const auto first = static_cast<std::uint32_t>(soup.vertices.size());
+      for (std::uint32_t i = 0; i <= kSide; ++i) {
+        for (std::uint32_t k = 0; k <= kSide; ++k) {
+          Vec3 corner;
+          corner[axis] = side * kSide * kUnit;
+          corner[(axis + 1) % 3] = (2.0 * i - kSide) * kUnit;
+          corner[(axis + 2) % 3] = side * (2.0 * k - kSide) * kUnit;
+          soup.vertices.push_back(corner);
+        }
+      }
+      for (std::uint32_t i = 0; i < kSide; ++i) {
+        for (std::uint32_t k = 0; k < kSide; ++k) {
+          const std::uint32_t at = first + i * (kSide + 1) + k, beyond = at + kSide + 1;
+          soup.faces.push_back({at, beyond, beyond + 1});
+          soup.faces.push_back({at, beyond + 1, at + 1});
+        }
+      }
+    }
+  }
+  const ClosedSurface surface = closed_surface(soup).surface;
+  ASSERT_EQ(faces_of(surface).size(), 6U);
+  std::set<std::set<std::uint32_t>> before, after;
+  const std::vector<std::uint32_t> kept = weld_equal(soup.vertices);
+  std::map<std::uint32_t, std::uint32_t> number;
+  for (const auto& face : soup.faces) {
+    for (const std::uint32_t v : face)
+      number.emplace(kept[v], static_cast<std::uint32_t>(number.size()));
+    before.insert({number[kept[face[0]]], number[kept[face[1]]], number[kept[face[2]]]});
+  }
+  for (const auto& t : surface.triangles) after.insert({t[0], t[1], t[2]});
+  EXPECT_EQ(after, before);
 }
 
 TEST(FlatFaces, TrianglesAtPocketsStay) {
