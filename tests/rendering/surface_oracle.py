@@ -64,6 +64,10 @@ class Surface:
                     if p < q:
                         rows.append((p, q, t, s, r))
         rows = np.array(rows)
+        self.beyond = [[] for _ in self.f]  # of each triangle, those across its sides
+        for t, s in rows[:, 2:4].tolist():
+            self.beyond[t].append(s)
+            self.beyond[s].append(t)
         self.e0, self.e1 = self.v[rows[:, 0]], self.v[rows[:, 1]]
         self.left, self.right = self.n[rows[:, 2]], self.n[rows[:, 3]]
         height = dot(self.left, self.v[rows[:, 4]] - self.e0)  # the other triangle's far corner over this one's plane
@@ -162,8 +166,20 @@ class Judge:
                 along = np.flatnonzero(flat & (self.s.n @ n_touched > 0))
                 if len(along):
                     near = along[self.s.distances(place)[along] < self.tolerance]
-                    out += [(n_touched, p + k * d) for t in near for k in self.portion(t, p, q)]
+                    out += [(n_touched, p + k * d) for k in self.portions(near, flat, p, q)]
         return out
+
+    def portions(self, near, flat, p, q):
+        """The ends of what lies over triangles, one after the other from `near` on, within one degree of the segment."""
+        found, seen, left = [], set(near), list(near)
+        while left:
+            t = left.pop()
+            over = self.portion(t, p, q)
+            found += over
+            if over:
+                left += [s for s in self.s.beyond[t] if flat[s] and s not in seen]
+                seen.update(self.s.beyond[t])
+        return found
 
     def at_ends(self, p, q, slope, is_point):
         """Facets that an end touches: the end that points into the facet; both where the segment lies along it."""
