@@ -34,44 +34,74 @@ STIFFNESS = 800.0
 
 
 OVERLAP = {"gear_on_shaft", "lattice", "boxes"}  # kinds whose shells hide parts of each other's triangles
+COARSEST, FINEST = 60, 500  # of the size: pieces of their triangles, and those on the border of what is hidden
+
+
+def dot(x, y):
+    return np.einsum("...i,...i->...", x, y)
+
+
+def shells(v, f):
+    """Of each triangle, the least corner of those that hang together with it; corners at one place are one."""
+    corner = np.unique(v, axis=0, return_inverse=True)[1].ravel()[f]
+    least = np.arange(corner.max() + 1)
+    while True:
+        before = least.copy()
+        low = least[corner].min(axis=1)
+        for k in range(3):
+            np.minimum.at(least, corner[:, k], low)
+        least = least[least]
+        if (least == before).all():
+            return least[corner[:, 0]]
 
 
 class Solid:
     """Signed depth by brute force: the nearest of all triangles that bound the union, and the winding number."""
 
     def __init__(self, v, f, divide):
-        self.whole = [v[f[:, k]] for k in range(3)]
+        shell = shells(v, f)
+        self.shells = [[v[f[shell == s, k]] for k in range(3)] for s in np.unique(shell)]
         self.size = np.linalg.norm(np.ptp(v, axis=0))
         self.low, self.high = v.min(axis=0), v.max(axis=0)
-        self.slack = 0
-        pieces = np.stack(self.whole, axis=1)
-        while divide:  # a piece is hidden as a whole, or not, within its size
-            sides = np.linalg.norm(pieces - np.roll(pieces, -1, axis=1), axis=2)
-            long = sides.max(axis=1) > self.size / 60
-            if not long.any():
-                self.slack = self.size / 60
-                break
-            few = pieces[long]
-            k = np.argmax(sides[long], axis=1)
-            p, q, r = (few[np.arange(len(few)), (k + i) % 3] for i in range(3))
-            mid = (p + q) / 2
-            pieces = np.concatenate([pieces[~long], np.stack([p, mid, r], axis=1), np.stack([mid, q, r], axis=1)])
-        self.a, self.b, self.c = (pieces[:, k] for k in range(3))
+        pieces = v[f]
+        self.slack = self.size / FINEST if divide else 0
         if divide:
-            n = np.cross(self.b - self.a, self.c - self.a)
-            middle = pieces.mean(axis=1) + 1e-6 * self.size * n / np.linalg.norm(n, axis=1)[:, None]
-            seen = self.winding(middle) <= 0
-            self.a, self.b, self.c = self.a[seen], self.b[seen], self.c[seen]
+            pieces = self.seen(pieces)
+        self.a, self.b, self.c = (pieces[:, k] for k in range(3))
+
+    def seen(self, pieces):
+        """The pieces of triangles that no shell hides. Where one is hidden in part, it is divided down to the slack."""
+        out = []
+        while len(pieces):
+            sides = np.linalg.norm(pieces - np.roll(pieces, -1, axis=1), axis=2)
+            longest = sides.max(axis=1)
+            small, last = longest < self.size / COARSEST, longest < self.size / FINEST
+            few = pieces[small]
+            n = np.cross(few[:, 1] - few[:, 0], few[:, 2] - few[:, 0])
+            middle = few.mean(axis=1)
+            at = middle[:, None] + .98 * np.concatenate([0 * middle[:, None], few - middle[:, None]], axis=1)
+            at += 1e-6 * self.size * (n / np.linalg.norm(n, axis=1)[:, None])[:, None]
+            clear = self.winding(at.reshape(-1, 3)).reshape(-1, 4) <= 0
+            out.append(few[np.where(last[small], clear[:, 0], clear.all(axis=1))])
+            left = ~small
+            left[small] = clear.any(axis=1) & ~clear.all(axis=1) & ~last[small]
+            few, k = pieces[left], np.argmax(sides[left], axis=1)
+            p, q, r = (few[np.arange(len(few)), (k + i) % 3] for i in range(3))
+            pieces = np.concatenate([np.stack([p, (p + q) / 2, r], axis=1), np.stack([(p + q) / 2, q, r], axis=1)])
+        return np.concatenate(out)
 
     def winding(self, p):
-        """van Oosterom & Strackee 1983."""
-        out = np.empty(len(p))
-        for i in range(0, len(p), 64):
-            a, b, c = (x[None] - p[i:i + 64, None] for x in self.whole)
-            la, lb, lc = (np.linalg.norm(x, axis=2) for x in (a, b, c))
-            top = np.einsum("ijk,ijk->ij", a, np.cross(b, c))
-            dot = lambda x, y: np.einsum("ijk,ijk->ij", x, y)
-            out[i:i + 64] = np.arctan2(top, la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb).sum(axis=1) / (2 * np.pi)
+        """van Oosterom & Strackee 1983, of the shells whose box holds a place: it is outside the others."""
+        out = np.zeros(len(p))
+        for corners in self.shells:
+            flat = np.concatenate(corners)
+            some = np.flatnonzero(np.all((p >= flat.min(axis=0)) & (p <= flat.max(axis=0)), axis=1))
+            for i in range(0, len(some), 64):
+                a, b, c = (x[None] - p[some[i:i + 64], None] for x in corners)
+                la, lb, lc = (np.sqrt(dot(x, x)) for x in (a, b, c))
+                top = dot(a, np.cross(b, c))
+                turns = np.arctan2(top, la * lb * lc + dot(a, b) * lc + dot(b, c) * la + dot(c, a) * lb)
+                out[some[i:i + 64]] += turns.sum(axis=1) / (2 * np.pi)
         return np.rint(out)
 
     def distances(self, p):
@@ -113,7 +143,7 @@ def presses(rng, solid, count, rows, reach):
 
 def check(args, folder, n):
     name, v, f = closed_meshes.mesh(n, args.seed)
-    if len(f) > args.faces:
+    if len(f) > (args.faces // 5 if name in OVERLAP else args.faces):
         return None
     rng = np.random.default_rng([args.seed, n, 1])
     solid = Solid(v, f, name in OVERLAP)
@@ -130,8 +160,8 @@ def check(args, folder, n):
     if told.returncode:
         return {"name": name, "refused": (told.stdout + told.stderr).strip(), "load": load}
     stated = re.search(r"wrong by up to ([\d.e+-]+) mm", told.stdout)
-    error = float(stated[1]) * 1e-3 * 1.5 if stated else 0
-    error += 1e-5 * solid.size + solid.slack
+    told_error = float(stated[1]) * 1e-3 if stated else 0
+    error = 1.5 * told_error + 1e-5 * solid.size + solid.slack
     faults, felt, fields = [], 0, "t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z"
     paths = presses(rng, solid, args.presses, args.rows, solid.size / 4)
     path, out = folder / f"{n}.csv", folder / f"{n}-out.csv"
@@ -195,7 +225,7 @@ def check(args, folder, n):
             faults.append(f"press {k} row {j}: force {size:.3g} N, and the tip is {deep[1] - d:.3g} m in the layer")
         if entered is not None and size / STIFFNESS > np.linalg.norm(tip - entered) + error:
             faults.append(f"press {k} row {j}: the ideal tip is {size / STIFFNESS:.3g} m away, farther than the way in")
-    return {"name": name, "faults": faults, "felt": felt, "load": load, "error": error / d, "faces": len(f), "depth": d}
+    return {"name": name, "faults": faults, "felt": felt, "load": load, "error": told_error / d, "faces": len(f), "depth": d}
 
 
 def main():
@@ -207,7 +237,7 @@ def main():
     parser.add_argument("--count", type=int, default=10)
     parser.add_argument("--presses", type=int, default=10)
     parser.add_argument("--rows", type=int, default=40)
-    parser.add_argument("--faces", type=int, default=3000)
+    parser.add_argument("--faces", type=int, default=3000, help="larger meshes are left out, a fifth for shells that overlap")
     parser.add_argument("--tool", choices=("point", "ray"), default="point")
     args = parser.parse_args()
     args.folder.mkdir(parents=True, exist_ok=True)
