@@ -89,14 +89,41 @@ void split(std::span<const Vec3> middles, std::span<std::uint32_t> triangles, st
       });
 }
 
+/// Halves a node's triangles until each of its children has its share.
+/// \param halve  called with triangles and how many of them the first half gets
+template <class T, class Halve, class Visit>
+void for_each_child(std::span<T> triangles, const Halve& halve, const Visit& visit) {
+  std::size_t share = 1;
+  while (share * Surface::kWidth < triangles.size()) share *= Surface::kWidth;
+  const auto divide = [&](const auto& self, std::span<T> some) -> void {
+    if (some.size() <= share) return visit(some);
+    const std::size_t half = (some.size() + share) / (2 * share) * share;
+    halve(some, half);
+    self(self, some.first(half));
+    self(self, some.subspan(half));
+  };
+  divide(divide, triangles);
+}
+
+/// Sorts triangles so that each node's are side by side, before there is any node: the middles are
+/// then no longer needed.
+void sort_for_nodes(std::span<const Vec3> middles, std::span<std::uint32_t> triangles) {
+  for_each_child(
+      triangles,
+      [&](std::span<std::uint32_t> some, std::size_t first) { split(middles, some, first); },
+      [&](std::span<std::uint32_t> child) {
+        if (child.size() > 1) sort_for_nodes(middles, child);
+      });
+}
+
 /// Moves each element to its place, without a copy of the array.
 template <class T>
-void move_to(stimuli::LargeArray<T>& all, std::vector<std::uint32_t> place) {
+void move_to(stimuli::LargeArray<T>& all, std::span<const std::uint32_t> place) {
+  std::vector<bool> there(all.size(), false);
   for (std::uint32_t i = 0; i < all.size(); ++i) {
-    while (place[i] != i) {
-      const std::uint32_t to = place[i];
-      std::swap(all[i], all[to]);
-      std::swap(place[i], place[to]);
+    for (std::uint32_t to = place[i]; !there[i]; to = place[to]) {
+      std::swap(all[i], all[to]);  // round the cycle, by way of i
+      there[to] = true;
     }
   }
 }
@@ -287,15 +314,16 @@ void Surface::find_edges() {
 void Surface::build_tree() {
   std::vector<std::uint32_t> order(triangles_.size());
   std::iota(order.begin(), order.end(), 0U);
-  nodes_.reserve(triangles_.size() / (kWidth - 1) + 16);
   {
     std::vector<Vec3> middles(triangles_.size());
     for (std::size_t i = 0; i < triangles_.size(); ++i) {
       const auto& c = triangles_[i].corners;
       middles[i] = (vertices_[c[0]] + vertices_[c[1]] + vertices_[c[2]]) / 3.0;
     }
-    root_ = build_node(middles, order);
+    sort_for_nodes(middles, order);
   }
+  nodes_.reserve(triangles_.size() / (kWidth - 1) + 16);
+  root_ = build_node(order);
   sort_by(order);  // a few places of nodes_ stay unused: to give them back would copy all
 }
 
@@ -332,14 +360,12 @@ void Surface::sort_by(std::span<const std::uint32_t> order) {
   };
   rename(rename, root_);
   move_to(triangles_, place);
-  move_to(vertices_, std::move(vertex_place));
+  move_to(vertices_, vertex_place);
   std::erase_if(file_order_, [&](std::uint32_t i) { return triangles_[i].is_back(); });
 }
 
-/// Divides the triangles among the children of a new node. All nodes are full, except for the last
-/// of each level.
-std::uint32_t Surface::build_node(std::span<const Vec3> middles,
-                                  std::span<std::uint32_t> triangles) {
+/// All nodes are full, except for the last of each level.
+std::uint32_t Surface::build_node(std::span<const std::uint32_t> triangles) {
   const auto index = static_cast<std::uint32_t>(nodes_.size());
   Node node;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -347,24 +373,15 @@ std::uint32_t Surface::build_node(std::span<const Vec3> middles,
     node.high[k] = -node.low[k];
   }
   const bool leaf = triangles.size() <= kWidth;
-  std::size_t share = 1;  // triangles of a child
-  while (share * kWidth < triangles.size()) share *= kWidth;
   nodes_.push_back(node);
   std::size_t child = 0;
-  const auto divide = [&](const auto& self, std::span<std::uint32_t> some) -> void {
-    if (some.size() > share) {
-      const std::size_t half = (some.size() + share) / (2 * share) * share;
-      split(middles, some, half);
-      self(self, some.first(half));
-      self(self, some.subspan(half));
-      return;
-    }
-    set_box(some, child, node);
-    set_normals(some, child, node);
-    node.children[child] = leaf ? some.front() : build_node(middles, some);
-    ++child;
-  };
-  divide(divide, triangles);
+  for_each_child(
+      triangles, [](const auto&, std::size_t) {},
+      [&](std::span<const std::uint32_t> some) {
+        set_box(some, child, node);
+        set_normals(some, child, node);
+        node.children[child++] = leaf ? some.front() : build_node(some);
+      });
   nodes_[index] = node;
   return index << 1 | (leaf ? 1U : 0U);
 }

@@ -123,7 +123,7 @@ class Surface {
   void find_edges();
   void build_tree();
   void sort_by(std::span<const std::uint32_t> order);
-  std::uint32_t build_node(std::span<const Vec3> middles, std::span<std::uint32_t> triangles);
+  std::uint32_t build_node(std::span<const std::uint32_t> triangles);
   void set_box(std::span<const std::uint32_t> triangles, std::size_t child, Node& node) const;
   void set_normals(std::span<const std::uint32_t> triangles, std::size_t child, Node& node) const;
 

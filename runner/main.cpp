@@ -27,6 +27,10 @@
 #include "runner/commands/shared/command.h"
 #include "stimuli/convex_mesh.h"
 
+#if defined(__GLIBC__)
+#include <malloc.h>
+#endif
+
 namespace {
 
 struct Command {
@@ -139,6 +143,10 @@ int run(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
+#if defined(__GLIBC__)
+  // Large arrays go back to the system when they are freed: glibc otherwise learns to keep them.
+  mallopt(M_MMAP_THRESHOLD, 4 << 20);
+#endif
   ::umask(0077);  // all that is written is the user's alone, folders as well
   occupy_standard_descriptors();
   // Beyond a limit on the size of files, writing fails with EFBIG instead of ending the program.

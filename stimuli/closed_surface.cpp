@@ -112,6 +112,8 @@ class Cleaner {
   Pockets checked_meanwhile(const ClosedSurface& surface) {
     const auto forget = [](auto&... all) { ((all = {}, all.shrink_to_fit()), ...); };
     forget(given_up_->vertices, given_up_->faces, points_, point_of_, vertex_, face_, bent_);
+    given_up_->names = nullptr;
+    naming_ = {};
 #if defined(__GLIBC__)
     malloc_trim(0);  // the faces were many small pieces
 #endif
@@ -557,6 +559,7 @@ class Cleaner {
       faults.throw_if_any();
     }
     std::vector<Index> number(points_.size(), kNoPoint);
+    surface.vertices.reserve(points_.size());
     for (Triangle& t : triangles_) {
       for (Index& v : t) {
         if (number[v] == kNoPoint) {
@@ -574,7 +577,7 @@ class Cleaner {
   const PolygonSoup& soup_;
   PolygonSoup* given_up_ = nullptr;  // the same, if it need not be kept
   const std::function<void(const ClosedSurface&)>* meanwhile_ = nullptr;
-  const MeshNaming naming_;
+  MeshNaming naming_;
   std::vector<std::string> notes_;
   std::vector<Index> point_of_;  // of each vertex of the soup
   std::vector<Vec3> points_;

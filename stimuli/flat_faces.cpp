@@ -30,7 +30,7 @@ class FlatFaceSearch {
         for (const std::uint32_t t : region_) face_[t] = kNoFlatFace;
       }
     }
-    if (faces == 0) face_.clear();
+    if (faces == 0) return {};
     return std::move(face_);
   }
 

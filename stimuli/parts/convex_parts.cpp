@@ -1,7 +1,9 @@
 #include "stimuli/parts/convex_parts.h"
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -10,6 +12,7 @@
 #include <utility>
 
 #include "stimuli/convex_mesh.h"
+#include "stimuli/face_triangles.h"
 #include "stimuli/half_edges.h"
 #include "stimuli/mesh_names.h"
 #include "stimuli/parts/triangle_surface.h"
@@ -74,6 +77,48 @@ TriangleSurface triangles_of(const PolygonSoup& soup) {
           {soup.vertices[face[0]], soup.vertices[face[k - 1]], soup.vertices[face[k]]});
   }
   return triangles;
+}
+
+/// Whether a corner stands so far above a face that no rounding of coordinates explains it. Looks
+/// at some faces and corners of a large mesh: to link all its edges takes a second at a million
+/// faces.
+bool is_plainly_concave(const PolygonSoup& soup) {
+  constexpr std::size_t kLarge = 50'000, kSeen = 1024, kFaces = 16, kCorners = 65'536;
+  constexpr Index kNone = 0xffffffff;
+  constexpr double kOfSize = 1e-2, kOfTilt = 1000;  // of the size; of what rounding tilts a face by
+  if (soup.faces.size() < kLarge || soup.group_names.size() > 1) return false;
+  std::vector<PolygonPlane> planes;
+  for (std::size_t i = 0; i < kSeen; ++i) {
+    std::vector<Vec3> corners;
+    for (const Index v : soup.faces[i * soup.faces.size() / kSeen]) {
+      if (v >= soup.vertices.size()) return false;
+      corners.push_back(soup.vertices[v]);
+    }
+    if (corners.size() >= 3) planes.push_back(plane_of(corners));
+  }
+  const auto width = [](const PolygonPlane& plane) {
+    return plane.diameter > 0 ? plane.area / plane.diameter : 0;
+  };
+  std::ranges::sort(planes, std::greater(), width);
+  planes.resize(std::min(planes.size(), kFaces));
+  std::vector<Vec3> corners;  // of faces: others do not count
+  Vec3 low(std::numeric_limits<double>::max()), high = -low;
+  for (std::size_t i = 0; i < soup.faces.size(); i += 1 + soup.faces.size() / kCorners) {
+    const Index v = soup.faces[i].empty() ? kNone : soup.faces[i][0];
+    if (v >= soup.vertices.size()) return false;
+    corners.push_back(soup.vertices[v]);
+    low = glm::min(low, corners.back());
+    high = glm::max(high, corners.back());
+  }
+  const double size = glm::length(high - low);
+  const double error =
+      std::max(soup.coordinate_error, 1e-11 * glm::length(glm::max(glm::abs(low), glm::abs(high))));
+  return std::ranges::any_of(planes, [&](const PolygonPlane& plane) {
+    const double least = kOfSize * size + kOfTilt * error * size / width(plane);
+    return std::ranges::any_of(corners, [&](const Vec3& corner) {
+      return glm::dot(plane.normal, corner - plane.middle) > least;
+    });
+  });
 }
 
 /// A group, and what decides whether another lies in it.
@@ -230,6 +275,7 @@ std::vector<ConvexMesh> convex_parts(const PolygonSoup& soup) {
 }
 
 std::optional<std::vector<ConvexMesh>> convex_as_it_is(const PolygonSoup& soup) {
+  if (is_plainly_concave(soup)) return std::nullopt;
   std::vector<ConvexMesh> parts;
   try {
     parts.emplace_back(soup);

@@ -111,6 +111,25 @@ double volume_of_groups(const PolygonSoup& soup) {
   return volume;
 }
 
+TEST(ConvexParts, LargeMeshesAreConvexAsTheirEdgesSay) {
+  PolygonSoup ball = icosphere(0.05, 6);  // 81,920 triangles
+  EXPECT_TRUE(convex_as_it_is(ball));
+  PolygonSoup rounded = ball;
+  rounded.coordinate_error = 3e-9;
+  for (Vec3& v : rounded.vertices) {
+    for (int k = 0; k < 3; ++k) v[k] = static_cast<float>(v[k]);
+  }
+  EXPECT_TRUE(convex_as_it_is(rounded));
+  PolygonSoup far = ball;  // a corner of no face
+  far.vertices.emplace_back(1, 0, 0);
+  EXPECT_EQ(convex_as_it_is(far).has_value(), convex_as_it_is(ball).has_value());
+  for (const double dent : {1e-6, 0.005}) {
+    PolygonSoup dented = ball;
+    for (Vec3& v : dented.vertices) v *= 1 - dent / 0.05 * std::max(0.0, 40 * v.x - 1);
+    EXPECT_FALSE(convex_as_it_is(dented)) << dent;
+  }
+}
+
 TEST(ConvexPartsOfGroups, VoidGroupBelongsToTheGroupAroundIt) {
   // In either order; in a shell inside a void of a larger shell, it belongs to the inner shell.
   for (const bool void_first : {false, true}) {
