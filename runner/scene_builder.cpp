@@ -737,11 +737,11 @@ SceneBuilder::Placed SceneBuilder::placed(const std::vector<stimuli::ObjectSpec>
   for (const int object : solid) {
     if (!may_collide(objects, static_cast<std::size_t>(object))) continue;
     const stimuli::ObjectSpec& spec = objects[static_cast<std::size_t>(object)];
-    std::vector<rendering::SurfaceShell> whole;
-    add_shells(spec, Pose{}, false, whole);
-    const bool is_felt = alone && whole.size() == shells.size();
+    std::vector<rendering::SurfaceShell> own;
+    add_shells(spec, Pose{}, false, own);
+    const bool is_felt = alone && own.size() == shells.size();
     out.solids.push_back(
-        {is_felt ? placed.surface : std::make_shared<const rendering::Surface>(whole),
+        {is_felt ? placed.surface : std::make_shared<const rendering::Surface>(own),
          spec.pose,
          object,
          {}});

@@ -260,11 +260,11 @@ Duration duration_of(const protocols::Protocol& protocol) {
   for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
     const protocols::TaskBlock& block = protocol.blocks[i];
     const double felt = felt_in_trial(block), pauses = (felt - 1) * block.inter_interval;
-    const double limit = protocols::is_study_of_shapes(protocol) ? block.time_out : HUGE_VAL;
-    const double one = std::min(seconds_of(block), block.interval_limit.value_or(limit));
+    const double limit = block.interval_limit.value_or(block.time_out);
+    const double one = std::min(seconds_of(block), limit);
     const double rests = felt * protocol.home.rest + pauses;
     // The limit of the answer counts from the begin of the last interval.
-    const double before = (felt - 1) * block.interval_limit.value_or(block.time_out);
+    const double before = (felt - 1) * limit;
     out.usual += static_cast<double>(counts[i].expected) * (felt * one + rests);
     out.longest += static_cast<double>(counts[i].most) * (before + block.time_out + rests);
   }

@@ -113,6 +113,14 @@ class Validate(unittest.TestCase):
                 self.assertRegex(place, r"^/(stimuli|renderers)/\d+$")
         # 4 + 70 + about 50 trials of two intervals of 5 s, each after 0.5 s of rest, 0.5 s apart
         self.assertTrue(1000 < study["duration_s"] < 2200 < study["longest_s"], study["duration_s"])
+        with tempfile.TemporaryDirectory() as folder:
+            protocol, hasty = json.loads((SOURCE / "protocols" / "stiffness-2afc.json").read_text()), pathlib.Path(folder) / "hasty.json"
+            for block in protocol["blocks"]:
+                block["time_out_s"] = 1  # to judge takes 5 s
+            hasty.write_text(json.dumps(protocol))
+            hurried = found(hasty)
+            self.assertLessEqual(hurried["duration_s"], hurried["longest_s"])
+            self.assertLess(hurried["duration_s"], study["duration_s"] / 2)
         shapes = found(HO2000)
         self.assertEqual((shapes["summary"]["trials"], shapes["summary"]["version"]), (608, 1))
         self.assertEqual(shapes["duration_s"], 608 * 10.5)
