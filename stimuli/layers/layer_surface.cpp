@@ -9,6 +9,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -90,14 +91,16 @@ class Contour {
       queue = trace();
     }
     if (soup_.faces.empty()) return {};
+    ClosedSurface surface;
     try {
-      return {closed(), worst_};
+      surface = closed();
     } catch (const MeshError&) {
       // Rounding may bring polygons together that touch. With a corner in each face, few touch.
       careful_ = true;
       trace();
-      return {closed(), worst_};
+      surface = closed();
     }
+    return {std::move(surface), std::max(worst_, found_error())};
   }
 
  private:
@@ -562,6 +565,51 @@ class Contour {
       for (std::size_t k = 0; k < count; ++k)
         x.error = std::max(x.error, off((x.place + places[k] + places[(k + 1) % count]) / 3.0));
     }
+  }
+
+  /// m, the largest error at corners, at middles of sides, and closely in the worst triangles. More
+  /// than what cells are divided for, because that is measured at fewer places.
+  double found_error() {
+    constexpr std::size_t kClosely = 200;  // triangles
+    constexpr int kSteps = 6;              // along their sides
+    std::vector<Sample> at;
+    at.reserve(corners_.size());
+    for (const Vec3& corner : corners_)
+      at.push_back(evaluate(corner, at.empty() ? nullptr : &at.back()));
+    std::unordered_map<std::uint64_t, double, Mixed> of_side;
+    const auto side_error = [&](Index a, Index b) {
+      if (a > b) std::swap(a, b);
+      const auto [known, is_new] = of_side.try_emplace(std::uint64_t{a} << 32U | b);
+      if (is_new)
+        known->second = std::abs(evaluate(0.5 * (corners_[a] + corners_[b]), &at[a]).height);
+      return known->second;
+    };
+    std::vector<std::pair<double, Index>> errors;
+    for (Index f = 0; f < soup_.faces.size(); ++f) {
+      const std::vector<Index>& face = soup_.faces[f];
+      double error = 0;
+      for (std::size_t k = 0; k < 3; ++k)
+        error =
+            std::max({error, std::abs(at[face[k]].height), side_error(face[k], face[(k + 1) % 3])});
+      errors.emplace_back(error, f);
+    }
+    const std::size_t count = std::min(kClosely, errors.size());
+    std::ranges::partial_sort(errors, errors.begin() + static_cast<std::ptrdiff_t>(count),
+                              std::greater());
+    double most = errors.front().first;
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::vector<Index>& face = soup_.faces[errors[i].second];
+      for (int u = 0; u <= kSteps; ++u) {
+        for (int v = 0; u + v <= kSteps; ++v) {
+          const double first = u / static_cast<double>(kSteps);
+          const double second = v / static_cast<double>(kSteps);
+          const Vec3 place = first * corners_[face[0]] + second * corners_[face[1]] +
+                             (1 - first - second) * corners_[face[2]];
+          most = std::max(most, std::abs(evaluate(place, &at[face[0]]).height));
+        }
+      }
+    }
+    return most;
   }
 
   /// The corner of the surface in a leaf: on as many planes as agree with it.

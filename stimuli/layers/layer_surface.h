@@ -7,19 +7,20 @@
 
 namespace palpate::stimuli {
 
-/// Of the depth; a hand tells depths apart that differ by a tenth.
+/// Of the depth; a hand tells depths apart that differ by a tenth. Triangles are divided until they
+/// are so exact at their middles.
 inline constexpr double kLayerError = 0.03;
 
 struct LayerSurface {
   ClosedSurface surface;  ///< without triangles: nothing is left
-  double error = 0;       ///< m; measured: its depth differs so much from the one asked for
+  double error = 0;       ///< m; the most found by which its depth differs from the one asked for
 };
 
 /// All points of the solid at least `depth` (m, above 0) below its surface. Exact under plane faces
-/// and convex edges; round under concave ones, where triangles approximate it. Errors are measured,
-/// and triangles divided until they are below kLayerError, or too many. What is less than that
-/// deeper than `depth` may be missing. \param within  the part of the solid that has the layer; it
-/// ends as much beyond that \throws MeshError  if what is left is no closed surface
+/// and convex edges; round under concave ones, where triangles approximate it, divided for
+/// kLayerError until they are too many. What is less than that deeper than `depth` may be missing.
+/// \param within  the part of the solid that has the layer; it ends kLayerError beyond that
+/// \throws MeshError if what is left is no closed surface
 LayerSurface layer_surface(const SolidDepth& solid, double depth,
                            const SolidDepth* within = nullptr);
 

@@ -69,7 +69,7 @@ TEST(LayerSurface, HoldsThePointsThatAreDeeper) {
   const double d = 0.004;
   const LayerSurface layer = layer_surface(depth_of(solid), d);
   ASSERT_FALSE(layer.surface.triangles.empty());
-  EXPECT_LE(layer.error, kLayerError * d);
+  EXPECT_LE(layer.error, 0.1 * d);
   const SolidDepth in_layer = depth_of(layer.surface);
   Random random(3);
   int inside = 0;
@@ -81,6 +81,25 @@ TEST(LayerSurface, HoldsThePointsThatAreDeeper) {
     inside += deeper > 0 ? 1 : 0;
   }
   EXPECT_GT(inside, 500);
+}
+
+TEST(LayerSurface, ErrorIsTheLargestOnItsTriangles) {
+  const ClosedSurface solid = closed_bracket();
+  Random random(4);
+  for (const double d : {0.002, 0.004, 0.006}) {
+    const LayerSurface layer = layer_surface(depth_of(solid), d);
+    double most = 0;
+    for (const auto& [a, b, c] : layer.surface.triangles) {
+      for (int i = 0; i < 6; ++i) {
+        const double u = std::sqrt(random.unit()), v = random.unit();
+        const Vec3 p = (1 - u) * layer.surface.vertices[a] +
+                       u * (1 - v) * layer.surface.vertices[b] + u * v * layer.surface.vertices[c];
+        most = std::max(most, std::abs(depth_in_bracket(p) - d));
+      }
+    }
+    EXPECT_LE(most, 1.1 * layer.error) << d;
+    EXPECT_GE(most, 0.5 * layer.error) << d;
+  }
 }
 
 TEST(LayerSurface, PlanesAndConvexEdgesAreExact) {
