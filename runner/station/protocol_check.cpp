@@ -1,7 +1,6 @@
 #include "runner/station/protocol_check.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstddef>
 #include <map>
 #include <utility>
