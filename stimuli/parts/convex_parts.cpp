@@ -97,7 +97,8 @@ bool is_plainly_concave(const PolygonSoup& soup) {
     if (corners.size() >= 3) planes.push_back(plane_of(corners));
   }
   const auto width = [](const PolygonPlane& plane) {
-    return plane.diameter > 0 ? plane.area / plane.diameter : 0;
+    const double width = plane.area / plane.diameter;
+    return width > 0 ? width : 0;  // not a number: there is no such plane
   };
   std::ranges::sort(planes, std::greater(), width);
   planes.resize(std::min(planes.size(), kFaces));

@@ -129,6 +129,11 @@ TEST(ConvexParts, LargeMeshesAreConvexAsTheirEdgesSay) {
   PolygonSoup wavy = ball;
   for (Vec3& v : wavy.vertices) v *= 1 + 0.1 * std::sin(100 * v.x);
   EXPECT_FALSE(convex_as_it_is(wavy));
+  for (const double far_away : {std::nan(""), HUGE_VAL, 1e200}) {
+    PolygonSoup broken = wavy;
+    for (std::size_t v = 0; v < broken.vertices.size(); v += 7) broken.vertices[v].y = far_away;
+    EXPECT_FALSE(convex_as_it_is(broken)) << far_away;
+  }
 }
 
 TEST(ConvexPartsOfGroups, VoidGroupBelongsToTheGroupAroundIt) {
