@@ -16,6 +16,7 @@
 #include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "tests/stimuli/concave_solids.h"
+#include "tests/stimuli/mesh_invariants.h"
 #include "tests/stimuli/part_checks.h"
 
 namespace palpate::stimuli {
@@ -116,9 +117,7 @@ TEST(ConvexParts, LargeMeshesAreConvexAsTheirEdgesSay) {
   EXPECT_TRUE(convex_as_it_is(ball));
   PolygonSoup rounded = ball;
   rounded.coordinate_error = 3e-9;
-  for (Vec3& v : rounded.vertices) {
-    for (int k = 0; k < 3; ++k) v[k] = static_cast<float>(v[k]);
-  }
+  for (Vec3& v : rounded.vertices) v = checks::single_precision(v);
   EXPECT_TRUE(convex_as_it_is(rounded));
   PolygonSoup far = ball;  // a corner of no face
   far.vertices.emplace_back(1, 0, 0);
