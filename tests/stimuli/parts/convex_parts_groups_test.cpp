@@ -180,9 +180,11 @@ TEST(ConvexPartsOfGroups, AVoidOutsideASolidIsNamed) {
 TEST(ConvexPartsOfGroups, ManyGroupsTakeTheirOwnVerticesOnly) {
   PolygonSoup soup;
   const auto add = [&](std::size_t count) {
-    for (std::size_t i = soup.group_names.size(); i < count; ++i)
+    for (std::size_t i = soup.group_names.size(); i < count; ++i) {
+      const std::size_t row = i / 25 % 25, layer = i / 625;
       add_cube(soup, std::to_string(i), 0.01,
-               0.03 * Vec3(double(i % 25), double(i / 25 % 25), double(i / 625)));
+               0.03 * Vec3(double(i % 25), double(row), double(layer)));
+    }
   };
   add(3000);
   const std::vector<ConvexMesh> parts = convex_parts(soup);
