@@ -89,14 +89,19 @@ TEST(LayerSurface, ErrorIsTheLargestOnItsTriangles) {
   for (const double d : {0.002, 0.004, 0.006}) {
     const LayerSurface layer = layer_surface(depth_of(solid), d);
     double most = 0;
+    int places = 0, beyond = 0;
     for (const auto& [a, b, c] : layer.surface.triangles) {
       for (int i = 0; i < 6; ++i) {
         const double u = std::sqrt(random.unit()), v = random.unit();
         const Vec3 p = (1 - u) * layer.surface.vertices[a] +
                        u * (1 - v) * layer.surface.vertices[b] + u * v * layer.surface.vertices[c];
-        most = std::max(most, std::abs(depth_in_bracket(p) - d));
+        const double off = std::abs(depth_in_bracket(p) - d);
+        most = std::max(most, off);
+        beyond += off > kLayerError * d ? 1 : 0;
+        ++places;
       }
     }
+    EXPECT_LE(beyond, 0.01 * places) << d;
     EXPECT_LE(most, 1.1 * layer.error) << d;
     EXPECT_GE(most, 0.5 * layer.error) << d;
   }
