@@ -8,8 +8,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "stimuli/convex_mesh.h"
 #include "stimuli/vec.h"
+
+namespace palpate::stimuli {
+class ConvexMesh;
+}
 
 namespace palpate::rendering {
 

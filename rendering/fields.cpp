@@ -45,7 +45,7 @@ Touch touch_of(const Scene& scene, const RenderState& state, const Rendering& fe
   return out;
 }
 
-/// What is added to a tick's wrench, as of Rendering.
+/// The wrench that fields add to a tick's, as of Rendering.
 struct Added {
   Vec3 force, torque, device1, device2;
 };

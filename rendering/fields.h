@@ -1,5 +1,5 @@
 #pragma once
-// What the hand feels of an object beside its surface: force fields, and the knock of a contact.
+// Forces of an object beside its surface: force fields, and the knock of a contact.
 // Added to the wrench of a tick, so a tick without them does not know of it. World frame, SI units.
 // Nothing here throws or allocates.
 

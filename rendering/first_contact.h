@@ -3,49 +3,18 @@
 // (facet_walk.h), the probe enters an object. Mesh frame, SI units.
 
 #include <cstdint>
-#include <memory>
-#include <span>
 
+#include "rendering/bounding_tree.h"
+#include "rendering/contact_feature.h"
 #include "rendering/direction_maps.h"
-#include "rendering/facet_walk.h"
 #include "rendering/probe.h"
-#include "stimuli/convex_mesh.h"
-#include "stimuli/large_array.h"
 #include "stimuli/vec.h"
 
+namespace palpate::stimuli {
+class ConvexMesh;
+}
+
 namespace palpate::rendering {
-
-// Bounding-volume hierarchy for continuous collision detection. Mesh frame, m.
-
-struct Box {
-  Vec3 low, high;  ///< m
-};
-
-/// A binary tree of axis-aligned boxes over primitives (polygons or edges), split at the median of
-/// the longest side. Gottschalk, Lin & Manocha 1996; Ho, Basdogan & Srinivasan 2000,
-/// section 4(a).
-class BoundingTree {
- public:
-  struct Node {
-    Box box;
-    /// Leaf: first primitive in order(). Inner node: right child; the left one is the next node.
-    std::uint32_t first;
-    std::uint32_t count;  ///< leaf: number of primitives; inner node: 0
-  };
-
-  BoundingTree() = default;
-  explicit BoundingTree(std::span<const Box> boxes);
-
-  /// Root first; empty without primitives.
-  const stimuli::LargeArray<Node>& nodes() const { return nodes_; }
-  const stimuli::LargeArray<std::uint32_t>& order() const { return order_; }
-
- private:
-  void build(std::span<const Box> boxes, std::uint32_t begin, std::uint32_t end);
-
-  stimuli::LargeArray<Node> nodes_;
-  stimuli::LargeArray<std::uint32_t> order_;
-};
 
 /// The bounding-volume hierarchies of one mesh: of polygons and of edges, as in section 4(a) of the
 /// paper. A mesh that is small enough to scan has no trees, and the point renderer needs no tree of

@@ -629,7 +629,7 @@ bool NearPairs::virtual_inside() {
   for (NearPair& near : all_.near) {
     PairState& state = state_of(near);
     const WalkResult at = locate(mesh_of(near), state.feature, near.true_tip, near.true_d);
-    // What carries the ideal tool stays, wherever the virtual tool is.
+    // A pair that carries the ideal tool keeps its facet, wherever the virtual tool is.
     if (!state.carries)
       state.feature = at.feature.kind != Kind::none ? at.feature : at.separating_feature;
     if (at.feature.kind != Kind::none && at.depth > part_of(near).tolerance) return true;

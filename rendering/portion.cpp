@@ -44,8 +44,9 @@ class CrossedFacet {
     }
     return low;
   }
-  /// The sides by which the line comes in begin here; those by which it goes out, at the other.
+  /// The first of the sides by which the line enters the facet.
   std::uint32_t first_entered() const { return first_after(-left_); }
+  /// The first of those by which it leaves.
   std::uint32_t first_left() const { return first_after(left_); }
 
  private:

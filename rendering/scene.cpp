@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <utility>
 
+#include "rendering/first_contact.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/texture.h"
 

@@ -9,19 +9,24 @@
 #include <memory>
 #include <vector>
 
+#include "rendering/bounding_tree.h"
 #include "rendering/contact.h"
-#include "rendering/facet_walk.h"
+#include "rendering/contact_feature.h"
 #include "rendering/fields.h"
-#include "rendering/first_contact.h"
 #include "rendering/probe.h"
 #include "rendering/separation.h"
 #include "rendering/texture.h"
 #include "rendering/tool.h"
 #include "rendering/union_state.h"
-#include "stimuli/convex_mesh.h"
 #include "stimuli/shapes.h"
 
+namespace palpate::stimuli {
+class ConvexMesh;
+}
+
 namespace palpate::rendering {
+
+class ContactTrees;
 
 /// The layer of parts without force that bound an object with layers: a tool inside them has not
 /// left the object.

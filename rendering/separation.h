@@ -5,7 +5,11 @@
 #include <cstdint>
 #include <glm/geometric.hpp>
 
-#include "stimuli/convex_mesh.h"
+#include "stimuli/vec.h"
+
+namespace palpate::stimuli {
+class ConvexMesh;
+}
 
 namespace palpate::rendering {
 

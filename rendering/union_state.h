@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "rendering/contact.h"
-#include "rendering/facet_walk.h"
+#include "rendering/contact_feature.h"
 #include "rendering/separation.h"
 #include "rendering/surface_patch.h"
 #include "rendering/tool.h"

@@ -14,6 +14,7 @@
 #include <stdexcept>
 
 #include "rendering/bodies/soft/soft_scene.h"
+#include "rendering/first_contact.h"
 #include "runner/touching_solids.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/convex_mesh.h"
@@ -321,8 +322,8 @@ bool SceneBuilder::place_layer_surface(int object, const std::vector<PlacedShape
     made = &layer_surfaces_.make(placing.shapes, wanted);
   } catch (const stimuli::MeshError&) {
     throw stimuli::MeshError({"/layers/" + std::to_string(number - 1) +
-                              "/depth_m: what lies so deep has parts that are too thin to tell "
-                              "apart; expected another depth, by a few percent"});
+                              "/depth_m: the layer at this depth has parts that are too thin to "
+                              "resolve; expected another depth, by a few percent"});
   }
   deepest = std::max(deepest, made->deepest);
   if (made->surface == nullptr) return false;

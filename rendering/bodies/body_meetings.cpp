@@ -4,6 +4,8 @@
 #include <cmath>
 #include <glm/geometric.hpp>
 
+#include "stimuli/convex_mesh.h"
+
 namespace palpate::rendering {
 namespace {
 

@@ -6,6 +6,7 @@
 
 #include "rendering/bodies/body_meetings.h"
 #include "rendering/bodies/contact_impulses.h"
+#include "stimuli/convex_mesh.h"
 
 namespace palpate::rendering {
 namespace {

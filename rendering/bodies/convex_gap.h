@@ -9,7 +9,11 @@
 #include <vector>
 
 #include "rendering/first_contact.h"
-#include "stimuli/convex_mesh.h"
+#include "stimuli/vec.h"
+
+namespace palpate::stimuli {
+class ConvexMesh;
+}
 
 namespace palpate::rendering {
 

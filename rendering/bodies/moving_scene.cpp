@@ -9,6 +9,7 @@
 
 #include "rendering/bodies/body_world.h"
 #include "rendering/bodies/moving_bodies.h"
+#include "stimuli/convex_mesh.h"
 
 namespace palpate::rendering {
 namespace {

@@ -6,8 +6,11 @@
 #include <vector>
 
 #include "rendering/surface.h"
-#include "stimuli/convex_mesh.h"
 #include "stimuli/vec.h"
+
+namespace palpate::stimuli {
+class ConvexMesh;
+}
 
 namespace palpate::rendering {
 

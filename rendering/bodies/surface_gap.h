@@ -9,7 +9,7 @@
 
 namespace palpate::rendering {
 
-/// What is looked at, m.
+/// The part of space to be searched, m.
 struct GapLimits {
   double reach = 0;     ///< places farther apart are left out
   double depth = 1e-3;  ///< corners and edges deeper inside the other surface are left out

@@ -310,6 +310,16 @@ class Filling {
 
 }  // namespace
 
+void PlacedPart::for_each_corner(const std::function<void(const Vec3&)>& visit) const {
+  const auto all = [&](const auto& vertices) {
+    for (const Vec3& vertex : vertices) visit(pose.orientation * vertex + pose.position);
+  };
+  if (mesh != nullptr)
+    all(mesh->vertices());
+  else
+    all(surface->vertices);
+}
+
 DistanceField::DistanceField(const std::vector<PlacedPart>& parts) {
   Vec3 low(std::numeric_limits<double>::max()), high = -low;
   for (const PlacedPart& part : parts) {

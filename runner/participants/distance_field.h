@@ -6,14 +6,18 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
 #include "runner/participants/lane_math.h"
 #include "stimuli/closed_surface.h"
-#include "stimuli/convex_mesh.h"
 #include "stimuli/large_array.h"
 #include "stimuli/vec.h"
+
+namespace palpate::stimuli {
+class ConvexMesh;
+}
 
 namespace palpate::runner::participants {
 
@@ -24,16 +28,7 @@ struct PlacedPart {
   std::shared_ptr<const stimuli::ClosedSurface> surface = nullptr;
 
   /// Calls visit(place) for each of its corners.
-  template <class Visit>
-  void for_each_corner(const Visit& visit) const {
-    const auto all = [&](const auto& vertices) {
-      for (const Vec3& vertex : vertices) visit(pose.orientation * vertex + pose.position);
-    };
-    if (mesh != nullptr)
-      all(mesh->vertices());
-    else
-      all(surface->vertices);
-  }
+  void for_each_corner(const std::function<void(const Vec3&)>& visit) const;
 };
 
 /// Up to six spacings outside, nodes are exact (the least distance of the parts). Inside, nodes

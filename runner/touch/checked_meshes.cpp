@@ -4,6 +4,7 @@
 #include <stdexcept>
 
 #include "runner/touch/scene_notes.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/solids/solid_mesh.h"

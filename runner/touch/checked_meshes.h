@@ -20,7 +20,7 @@ void check_meshes(const stimuli::ObjectSpec& object, const std::string& pointer,
 std::vector<protocols::Fault> mesh_faults(const protocols::Protocol& protocol,
                                           const std::string& file, SceneBuilder& builder);
 
-/// What there is to be said of the mesh files of a protocol's stimuli, a sentence each.
+/// Notes on the mesh files of a protocol's stimuli, a sentence each.
 std::vector<std::string> stimulus_notes(const protocols::Protocol& protocol, SceneBuilder& builder);
 
 }  // namespace palpate::runner::touch

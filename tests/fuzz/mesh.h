@@ -9,6 +9,7 @@
 
 #include "rendering/surface.h"
 #include "stimuli/closed_surface.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/polygon_soup.h"

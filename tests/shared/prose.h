@@ -5,7 +5,7 @@
 
 namespace palpate::testing {
 
-/// What is wrong with its form, where a part is missing as a rule; empty: nothing.
+/// The fault of its form, where a part is missing as a rule; empty: none.
 inline std::string flaw_of(const std::string& text) {
   if (text.empty()) return "nothing is said";
   for (const char* within :

@@ -1,5 +1,5 @@
 #pragma once
-// What must hold at every tick of a renderer over one convex object, checked against the reference.
+// Properties of every tick of a renderer over one convex object, checked against the reference.
 
 #include <cmath>
 #include <glm/geometric.hpp>
@@ -47,7 +47,7 @@ class Bench {
     return renderer_.tick(scene_, state_, world, kTick);
   }
 
-  /// What the renderer feels of the probe, in the mesh frame: the tip alone, or all of it.
+  /// The part of the probe that the renderer feels, in the mesh frame: the tip alone, or all of it.
   rendering::LineProbe felt(const rendering::LineProbe& world) const {
     const rendering::LineProbe local = to_local(pose_, world);
     return renderer_.side_contact() ? local : rendering::LineProbe{local.tip, local.tip};

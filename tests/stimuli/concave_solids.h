@@ -13,8 +13,8 @@
 #include <vector>
 
 #include "data/base/random.h"
-#include "stimuli/convex_mesh.h"
 #include "stimuli/orientation.h"
+#include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::stimuli::solids {

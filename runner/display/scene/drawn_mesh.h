@@ -9,8 +9,12 @@
 #include <span>
 #include <vector>
 
-#include "stimuli/convex_mesh.h"
 #include "stimuli/shapes.h"
+#include "stimuli/vec.h"
+
+namespace palpate::stimuli {
+class ConvexMesh;
+}
 
 namespace palpate::runner::display {
 

@@ -5,8 +5,12 @@
 #include <cstdint>
 
 #include "rendering/probe.h"
-#include "stimuli/convex_mesh.h"
 #include "stimuli/shapes.h"
+#include "stimuli/vec.h"
+
+namespace palpate::stimuli {
+class ConvexMesh;
+}
 
 namespace palpate::runner::evidence {
 

@@ -10,7 +10,11 @@
 #include <vector>
 
 #include "rendering/probe.h"
-#include "stimuli/convex_mesh.h"
+#include "stimuli/vec.h"
+
+namespace palpate::stimuli {
+class ConvexMesh;
+}
 
 namespace palpate::runner::evidence {
 

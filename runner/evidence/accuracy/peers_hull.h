@@ -8,6 +8,7 @@
 #include "rendering/direction_maps.h"
 #include "rendering/separation.h"
 #include "runner/evidence/accuracy/peers.h"
+#include "stimuli/convex_mesh.h"
 
 namespace palpate::runner::evidence::peers {
 

@@ -11,6 +11,7 @@
 
 #include "data/base/random.h"
 #include "rendering/bodies/soft/soft_scene.h"
+#include "rendering/first_contact.h"
 #include "rendering/renderer.h"
 #include "runner/evidence/tick_meters.h"
 #include "runner/scene_builder.h"
@@ -53,7 +54,6 @@ class TickTimer {
   std::size_t ticks() const { return counts_.size(); }
   /// Whether to clear the near caches before each tick, as the rest of a millisecond does at 1 kHz.
   void set_cold(bool cold) { cold_ = cold; }
-  bool is_cold() const { return cold_; }
 
   /// Returns the statistics of the row and starts a new one.
   TickCost take() {

@@ -9,8 +9,11 @@
 
 #include "rendering/probe.h"
 #include "runner/evidence/verification/reference.h"
-#include "stimuli/convex_mesh.h"
 #include "stimuli/vec.h"
+
+namespace palpate::stimuli {
+class ConvexMesh;
+}
 
 namespace palpate::runner::evidence {
 

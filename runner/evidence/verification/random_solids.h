@@ -9,8 +9,13 @@
 
 #include "data/base/random.h"
 #include "rendering/probe.h"
-#include "stimuli/convex_mesh.h"
 #include "stimuli/orientation.h"
+#include "stimuli/polygon_soup.h"
+#include "stimuli/vec.h"
+
+namespace palpate::stimuli {
+class ConvexMesh;
+}
 
 namespace palpate::runner::evidence {
 

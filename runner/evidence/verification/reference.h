@@ -6,7 +6,11 @@
 #include <optional>
 
 #include "rendering/contact.h"
-#include "stimuli/convex_mesh.h"
+#include "stimuli/vec.h"
+
+namespace palpate::stimuli {
+class ConvexMesh;
+}
 
 namespace palpate::runner::evidence {
 

@@ -78,7 +78,7 @@ class SurfaceReference {
     Vec3 centre;
     double radius = 0, stiffness = 0;
   };
-  /// What bounds the tip: dot(normal, tip) >= offset, while the tip is near.
+  /// A bound of the tip: dot(normal, tip) >= offset, while the tip is near.
   struct Bound {
     Vec3 normal;
     double offset = 0, stiffness = 0;

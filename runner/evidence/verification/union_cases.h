@@ -6,7 +6,12 @@
 #include <vector>
 
 #include "data/base/random.h"
-#include "stimuli/convex_mesh.h"
+#include "stimuli/polygon_soup.h"
+#include "stimuli/vec.h"
+
+namespace palpate::stimuli {
+class ConvexMesh;
+}
 
 namespace palpate::runner::evidence {
 
