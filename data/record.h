@@ -95,8 +95,8 @@ struct HeardRecord {
   static constexpr double kMostLag = 0.012;
 };
 
-/// What a trial asks. Onset, response time and contact of its record are those of the last interval
-/// felt.
+/// The task of a trial. Onset, response time and contact of its record are those of the last
+/// interval felt.
 struct TaskRecord {
   /// "identify", "compare", "detect", "rate", "adjust", "external", "reach"
   std::string task = "identify";
@@ -163,7 +163,7 @@ struct TrialRecord {
   std::vector<FrameRecord> frames = {};  ///< in which something was drawn; kept with the samples
 };
 
-/// What was presented, in order.
+/// The intervals as presented, in order.
 std::vector<IntervalRecord> intervals_of(const TrialRecord& record);
 
 /// State of the stimulus after the tick; none: it did not move, or there was none.

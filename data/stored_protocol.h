@@ -1,7 +1,7 @@
 #pragma once
-// What tables and analyses read of a protocol's stored text. Not validated again: it was valid when
-// stored, and its mesh files may be missing now. What the text does not have, or has as another
-// type, keeps its default.
+// The parts of a protocol's stored text that tables and analyses read. Not validated again: it was
+// valid when stored, and its mesh files may be missing now. What the text does not have, or has as
+// another type, keeps its default.
 
 #include <string>
 #include <utility>
@@ -29,7 +29,7 @@ struct StoredColumn {
   std::vector<std::string> choices;  ///< empty: any text or number
 };
 
-/// What is varied within participants besides renderer, stimulus and level.
+/// A factor within participants besides renderer, stimulus and level.
 struct StoredFactor {
   std::string name;
   std::vector<std::pair<std::string, std::string>> levels;  ///< name, JSON of what it sets

@@ -7,6 +7,7 @@
 
 #include "data/base/cell_name.h"
 #include "data/base/json_text.h"
+#include "data/base/words.h"
 #include "data/stored_protocol.h"
 
 namespace palpate::data {
@@ -16,12 +17,6 @@ constexpr std::size_t kMaxNamed = 5;  // most places named in a difference
 constexpr std::size_t kMaxValue = 43;
 
 std::string shown(const nlohmann::json& value) { return json_excerpt(value, kMaxValue); }
-
-std::string in_lower_case(std::string text) {
-  std::transform(text.begin(), text.end(), text.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return text;
-}
 
 /// Describes the steps that turn one document into another (RFC 6902): "/seed 1 and 2".
 class DifferenceTexts {
@@ -162,7 +157,6 @@ std::vector<std::string> figure_columns(const SweepPlan& plan) {
   std::vector<std::string> out;
   for (const TaskCellColumns& cell : task_columns(plan))
     out.insert(out.end(), cell.columns.begin(), cell.columns.end());
-  if (!out.empty()) return out;
   for (const char* what : {"gain_", "gain_se_"}) {
     for (const std::string& shape : plan.shapes) out.push_back(what + shape);
   }
@@ -170,6 +164,16 @@ std::vector<std::string> figure_columns(const SweepPlan& plan) {
     for (const std::string& renderer : plan.renderers) {
       for (const std::string& shape : plan.shapes) out.push_back(what + (renderer + "_" + shape));
     }
+  }
+  return out;
+}
+
+std::vector<EstimateColumns> estimate_columns(const SweepPlan& plan) {
+  std::vector<EstimateColumns> out;
+  for (const std::string& shape : plan.shapes) out.push_back({"gain_" + shape, "gain_se_" + shape});
+  for (const TaskCellColumns& cell : task_columns(plan)) {
+    for (std::size_t c = 0; c < cell.columns.size(); c += 2)
+      out.push_back({cell.columns[c], cell.columns[c + 1]});
   }
   return out;
 }
@@ -185,12 +189,12 @@ std::vector<std::string> sweep_columns(const SweepPlan& plan) {
 std::optional<std::pair<std::string, std::string>> columns_alike(const SweepPlan& plan) {
   std::map<std::string, std::string> seen{{"seed", "seed"}, {"order_seed", "order_seed"}};
   for (const std::string& column : sweep_columns(plan)) {
-    const auto [found, added] = seen.emplace(in_lower_case(column), column);
+    const auto [found, added] = seen.emplace(lower_case(column), column);
     if (!added) return std::pair(found->second, column);
   }
   for (const std::string& parameter : plan.parameters) {
     for (const std::string& shape : plan.shapes) {
-      if (in_lower_case(parameter) == in_lower_case(shape)) return std::pair(parameter, shape);
+      if (lower_case(parameter) == lower_case(shape)) return std::pair(parameter, shape);
     }
   }
   return std::nullopt;

@@ -67,6 +67,12 @@ struct TaskCellColumns {
 };
 /// Empty: version 1.
 std::vector<TaskCellColumns> task_columns(const SweepPlan& plan);
+/// The columns of a figure and of its standard error.
+struct EstimateColumns {
+  std::string estimate, error;
+};
+/// Of all figures that have one, in the order of figure_columns().
+std::vector<EstimateColumns> estimate_columns(const SweepPlan& plan);
 /// point, status, reason, the parameters, the figures.
 std::vector<std::string> sweep_columns(const SweepPlan& plan);
 /// Two columns of one name, or a parameter and a shape (whose name stands for its gain in a

@@ -28,9 +28,9 @@ constexpr std::array<std::pair<std::string_view, std::string_view>, 9> kOtherNam
      {"arrowup", "up"},
      {"arrowdown", "down"}}};
 
-// What a single key of some layout writes. Left out: controls, spaces, signs without a form of
-// their own, and ideographs and syllables, which an input method puts together from several keys.
-// The schema has the same ranges.
+// Characters that a single key of some layout writes. Left out: controls, spaces, signs without a
+// form of their own, and ideographs and syllables, which an input method puts together from several
+// keys. The schema has the same ranges.
 constexpr std::array<std::pair<char32_t, char32_t>, 15> kWritten = {{{U'!', U'9'},
                                                                      {U';', U'~'},
                                                                      {0xA1, 0xAC},

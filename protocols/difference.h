@@ -1,5 +1,5 @@
 #pragma once
-// What has changed in a protocol since a participant began with it.
+// Changes of a protocol since a participant began with it.
 
 #include <string>
 #include <vector>

@@ -286,7 +286,7 @@ int Cells::in_cell(const TaskBlock& block, const std::vector<std::size_t>& level
     own.throw_if_any();
   } catch (const InputError& error) {
     const Fault& fault = error.faults().front();
-    // Of several places, the one that set what is at fault.
+    // Of several places, name the one that set the faulty value.
     const auto at = std::ranges::find_if(places, [&](const std::string& place) {
       return one_holds_the_other(target_of(json::json_pointer(place).back())->rest, fault.location);
     });
@@ -375,7 +375,7 @@ void Cells::check_sets(const TaskBlock& block) {
     for (const char* const key :
          {"/stimuli", "/standard", "/factors", "/mixing", "/shared", "/task", "/session",
           "/practice", "/absent", "/level", "/keys", "/procedure", "/renderers",
-          // What an answer means: cells are compared.
+          // The meaning of an answer: cells are compared.
           "/asks", "/answer", "/intervals", "/scale", "/min", "/max", "/modulus", "/answers",
           "/catch_trials", "/order", "/repetitions"}) {
       if (target.stimulus.empty() && one_holds_the_other(target.rest, key))

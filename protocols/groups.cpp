@@ -8,6 +8,7 @@
 
 #include "data/base/column_names.h"
 #include "data/base/json_text.h"
+#include "data/base/words.h"
 
 namespace palpate::protocols {
 namespace {

@@ -32,7 +32,7 @@ using nlohmann::json;
 
 constexpr std::size_t kMaxLabel = 80;  // bytes of a label
 
-/// What the protocols of groups change.
+/// The changes that groups make to a protocol.
 struct Patches {
   std::vector<json> of_groups;
   bool masked = false;  ///< names of groups
@@ -278,7 +278,7 @@ void remove_task_texts(Protocol::Texts& texts) {
     text->clear();
 }
 
-/// What version 1 says of the one task that it has.
+/// Reads the keys that version 1 alone has.
 void read_identification(ObjectReader& reader, Protocol& protocol, const MeshFiles&, Patches&) {
   reader.integer("repetitions", protocol.repetitions, kRepetitions, Presence::required);
   protocol.blocks = {shapes_block(protocol)};
@@ -397,7 +397,7 @@ void fix_renderer_order(ObjectReader&, Protocol& protocol) {
   protocol.renderer_order = RendererOrder::fixed;  // each block has its own
 }
 
-/// What a version says in its own way, in the order of reading.
+/// The readers and checks that differ between versions, in the order of reading.
 struct VersionRules {
   void (*read_order_of_renderers)(ObjectReader&, Protocol&);
   void (*read_study)(ObjectReader&, Protocol&, const MeshFiles&, Patches&);

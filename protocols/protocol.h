@@ -103,7 +103,7 @@ struct FactorLevel {
   /// JSON pointer ("/stimuli/*/friction_static", "/block/time_out_s") and the value's JSON text.
   std::vector<std::pair<std::string, std::string>> sets;
 };
-/// What is varied within participants besides renderer, stimulus and level.
+/// A factor within participants besides renderer, stimulus and level.
 struct Factor {
   std::string name;
   std::vector<FactorLevel> levels;

@@ -1,5 +1,5 @@
 #pragma once
-// What a participant sees beside touch, as plain values. Meaning and default of each key:
+// Sight beside touch, as plain values. Meaning and default of each key:
 // protocol.v2.schema.json. SI units.
 
 #include <array>
@@ -30,7 +30,7 @@ struct ViewSpec {
   bool lag_accepted = false;            ///< a lag that people may notice does not refuse a session
 };
 
-/// What is seen of a stimulus, congruent with touch or changed by a stated amount.
+/// The look of a stimulus: congruent with touch, or changed by a stated amount.
 struct SeenSpec {
   enum class When { forces, contact, before, always };
   bool object = false, tool = false, picture = false;

@@ -1,5 +1,5 @@
 #pragma once
-// What a participant hears of a stimulus, as plain values. Meaning and default of each key:
+// The sound of a stimulus, as plain values. Meaning and default of each key:
 // protocol.v2.schema.json. SI units.
 
 #include <memory>

@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::size_t kMostTests = 100;
 
-/// What the analysis may test, in the order in which it names products.
+/// The effects that the analysis may test, in the order in which it names products.
 std::vector<std::string> sources_of_effects(const Protocol& protocol) {
   std::vector<std::string> out;
   if (protocol.groups.any()) out.emplace_back("group");

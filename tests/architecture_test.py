@@ -121,7 +121,7 @@ PUBLIC = {
     "protocols": "answer_keys difference factors groups json_document parse protocol schedule session_plan sight sound sweep_space "
                  "tasks/block_order tasks/block_procedures tasks/levels tasks/texts",
     "protocols/procedures": "procedure procedure_spec psychometric recovery",
-    "data/base": "cell_name checksum column_names group_assignment input_file json_text markdown random sobol text",
+    "data/base": "cell_name checksum column_names group_assignment input_file json_text markdown random sobol text words",
     "data": "column_table record stored_protocol sweep_record",
     "data/files": "atomic_file atomic_folder file_permissions text_sink output_check utc",
     "data/store": "export_log frames unmaskings participant_columns participant_groups protocol_rows schema connection station_database store sweep_file "

@@ -20,6 +20,7 @@
 #include "data/base/column_names.h"
 #include "data/base/json_text.h"
 #include "data/base/text.h"
+#include "data/base/words.h"
 #include "data/files/text_sink.h"
 #include "data/store/participant_groups.h"
 #include "data/store/store.h"
@@ -359,6 +360,11 @@ void note_factors_of_trials(StudyTable& table) {
   note_factors(found, table);
 }
 
+/// The protocol of a group, by its SHA-256 and the group's name; "": without groups.
+std::string procedures_key(const std::string& protocol_sha256, const std::string& group) {
+  return group.empty() ? protocol_sha256 : protocol_sha256 + "/" + group;
+}
+
 /// Adds the procedures of a protocol, for each of its groups; of masked ones by both names.
 void add_procedures(const std::string& sha256, const std::string& text, const std::string& path,
                     StudyTable& table) {
@@ -624,7 +630,7 @@ StudyTable of_shapes(TrialTable times, const std::string& source,
     for (const std::string& name : data::read_stored_protocol(one.text).stimuli)
       note_once(name, order);
   }
-  if (!order.empty()) order_shapes(times, order);
+  order_shapes(times, order);
   table.source = source;
   table.simulated = times.simulated != Simulated::no;
   table.provenance = times.provenance;
@@ -650,10 +656,6 @@ const std::string& GroupLabels::add(const std::string& participant, const std::s
   auto at = std::ranges::find(names, group);
   if (at == names.end()) at = names.insert(names.end(), group);
   return names[of.emplace(participant, static_cast<std::size_t>(at - names.begin())).first->second];
-}
-
-std::string procedures_key(const std::string& protocol_sha256, const std::string& group) {
-  return group.empty() ? protocol_sha256 : protocol_sha256 + "/" + group;
 }
 
 const protocols::BlockProcedures* block_of(const StudyTrial& trial, const StudyTable& table) {

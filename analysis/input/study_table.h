@@ -23,7 +23,7 @@ struct GroupLabels {
   const std::string& add(const std::string& participant, const std::string& group);
 };
 
-/// What is varied within participants besides renderer, stimulus and level.
+/// A factor within participants besides renderer, stimulus and level.
 struct StudyFactor {
   std::string name;
   std::vector<std::string> levels;  ///< in the protocol's order
@@ -52,9 +52,6 @@ struct StudyTable {
   /// given.
   std::map<std::string, std::map<std::string, protocols::BlockProcedures>> procedures;
 };
-
-/// The protocol of a group, by its SHA-256 and the group's name; "": without groups.
-std::string procedures_key(const std::string& protocol_sha256, const std::string& group);
 
 /// The procedure of a trial's block; nullptr: the source has no protocol.
 const protocols::BlockProcedures* block_of(const StudyTrial& trial, const StudyTable& table);

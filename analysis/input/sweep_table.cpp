@@ -68,6 +68,7 @@ SweepTable read_sweep_table(const std::string& path) {
   table.renderers = plan.renderers;
   table.columns = plan.parameters;
   for (const std::string& column : data::figure_columns(plan)) table.columns.push_back(column);
+  table.estimates = data::estimate_columns(plan);
   table.values.resize(table.columns.size());
   table.words = words_of(plan);
   std::map<std::string, std::size_t> reasons;

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "data/sweep_record.h"
+
 namespace palpate::analysis {
 
 struct SweepTable {
@@ -23,6 +25,7 @@ struct SweepTable {
   std::vector<std::string> parameters, shapes, renderers;
   /// Parameters, then figures (gain_SHAPE, time_RENDERER_SHAPE and so on).
   std::vector<std::string> columns;
+  std::vector<data::EstimateColumns> estimates;  ///< the figures with a standard error
   /// [column][row]; NaN: undefined, or of a failed point. A word is stored as its index in `words`.
   std::vector<std::vector<double>> values;
   std::vector<std::vector<std::string>> words;  ///< of each parameter; empty: numbers

@@ -18,6 +18,7 @@
 #include "analysis/input/csv_reader.h"
 #include "analysis/input/study_record.h"
 #include "analysis/text.h"
+#include "data/base/words.h"
 #include "data/files/text_sink.h"
 #include "data/store/store.h"
 #include "data/store/task_text.h"
@@ -423,12 +424,6 @@ void note_shown(std::string_view value, std::vector<std::string>& known) {
   constexpr std::size_t kMostShown = 8, kLongest = 80;
   if (!known.empty() && known.back() == value) return;  // as in most rows
   if (known.size() < kMostShown) note_once(printable(value, kLongest), known);
-}
-
-std::string listed(const std::vector<std::string>& parts) {
-  std::string all;
-  for (const std::string& part : parts) all += (all.empty() ? "" : ", ") + part;
-  return all;
 }
 
 std::uint32_t Interner::number(std::string_view name) {

@@ -133,8 +133,6 @@ void warn_of_alike(const std::string& what, const std::deque<std::string>& names
 void note_once(const std::string& value, std::vector<std::string>& known);
 /// For values that are displayed only: made printable, at most eight are kept.
 void note_shown(std::string_view value, std::vector<std::string>& known);
-/// "a, b"
-std::string listed(const std::vector<std::string>& parts);
 
 /// Numbers distinct names, from 0, in order of first appearance (string interning).
 class Interner {

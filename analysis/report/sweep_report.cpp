@@ -299,9 +299,10 @@ std::string sweep_json(const SweepAnalysis& analysis) {
 
 std::vector<Table> sweep_tables(const SweepAnalysis& analysis) {
   std::vector<Table> out;
-  if (!analysis.table.shapes.empty()) out.push_back(gains_table(analysis));
+  out.push_back(gains_table(analysis));
   for (const Drivers& drivers : analysis.drivers) out.push_back(drivers_table(analysis, drivers));
-  if (!analysis.table.reasons.empty()) out.push_back(reasons_table(analysis));
+  out.push_back(reasons_table(analysis));
+  std::erase_if(out, [](const Table& table) { return table.rows.empty(); });
   return out;
 }
 

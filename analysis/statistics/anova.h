@@ -1,5 +1,5 @@
 #pragma once
-// What analyses of variance share.
+// Common parts of analyses of variance.
 
 #include <Eigen/Core>
 #include <boost/math/distributions/fisher_f.hpp>

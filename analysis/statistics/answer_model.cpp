@@ -31,7 +31,7 @@ using Eigen::VectorXd;
 /// Simulated studies without a value, above which there is no interval: it would be too short.
 constexpr double kMostFailed = 0.025;
 
-/// The cells of the analysis that one model is of.
+/// The cells of the analysis that one model covers.
 using BlockCells = std::vector<const TaskCell*>;
 
 bool has_answers(const TaskCell& cell) {

@@ -14,7 +14,7 @@ namespace bm = boost::math;
 
 double quantile_975(double df) { return quantile(bm::students_t(df), 0.975); }
 
-/// What of a participant is compared.
+/// The value of a participant to be compared.
 struct Compared {
   std::optional<DesignCondition> condition;  ///< none: the mean over all cells
   bool of_difference = false;

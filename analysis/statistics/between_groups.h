@@ -59,7 +59,7 @@ struct BetweenGroups {
 
 enum class WithinContrasts { left_out, added };
 
-/// What is compared: the mean over all cells, that under each level of some factors, and the
+/// The compared value: the mean over all cells, that under each level of some factors, and the
 /// differences of these from that under the first level.
 struct ComparedConditions {
   std::vector<std::optional<DesignCondition>> means;

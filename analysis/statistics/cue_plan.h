@@ -1,5 +1,5 @@
 #pragma once
-// What a study of seen and felt cues can show: many simulated studies of people of two rules.
+// Power of a study of seen and felt cues, from many simulated studies of people of two rules.
 
 #include <cstddef>
 #include <cstdint>

@@ -21,11 +21,6 @@ struct GroupPsychometricModel {
   double guess = 0.5;  ///< of a forced choice
   /// Levels on one side of it: the location is the log of the threshold's distance from it.
   std::optional<double> standard;
-
-  /// The location is a level (or its log), not the log of a distance.
-  bool location_is_log() const {
-    return standard || function.scale != protocols::LevelScale::linear;
-  }
 };
 
 /// Answers of a participant in a condition; catch trials have no stimulus.

@@ -11,8 +11,8 @@
 
 namespace palpate::analysis {
 
-/// What is to be found, natural logs of ratios. The last group differs from all others, which are
-/// equal; half of an effect on the gain is in each renderer.
+/// The effects to be found, natural logs of ratios. The last group differs from all others, which
+/// are equal; half of an effect on the gain is in each renderer.
 struct GroupEffects {
   std::size_t groups = 2;
   double between = 0;      ///< of the times

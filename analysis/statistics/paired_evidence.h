@@ -1,5 +1,5 @@
 #pragma once
-// What a paired t-test says for the absence of a difference: equivalence within given bounds, and
+// Evidence of a paired t-test for the absence of a difference: equivalence within given bounds, and
 // the Bayes factor of Rouder et al. (2009).
 
 #include <cstddef>
@@ -29,7 +29,7 @@ double jzs_bayes_factor(double t, std::size_t n);
 /// With fewer pairs it is above 1/3 even at t = 0: it can never support "no difference".
 inline constexpr std::size_t kLeastForBayes = 9;
 
-/// What a paired t-test says for no difference.
+/// The evidence of a paired t-test for no difference.
 struct PairedEvidence {
   std::optional<Interval> ci90;
   /// The least bound with which two one-sided tests at 5 % show equivalence.

@@ -68,14 +68,16 @@ double bound_of(const Probability& probability, double wanted) {
   return (low + high) / 2;
 }
 
-}  // namespace
-
+/// Two-sided alpha, half of it on either side, spent up to a share t of the information. \param
+/// share  t, 0 to 1
 double alpha_spent(Spending spending, double alpha, double share) {
   if (share >= 1) return alpha;
   if (spending == Spending::pocock) return alpha * std::log1p((std::numbers::e - 1) * share);
   const double z = quantile(complement(boost::math::normal(), alpha / 4));
   return 4 * above(z / std::sqrt(share));
 }
+
+}  // namespace
 
 std::vector<Look> planned_looks(Spending spending, double alpha,
                                 const std::vector<std::size_t>& participants) {

@@ -13,10 +13,6 @@ enum class Spending {
   pocock           ///< alpha ln(1 + (e - 1) t): much at first
 };
 
-/// Two-sided alpha, half of it on either side, spent up to a share t of the information. \param
-/// share  t, 0 to 1
-double alpha_spent(Spending spending, double alpha, double share);
-
 struct Look {
   std::size_t participants = 0;
   double alpha = 0;  ///< of a two-sided test at this look

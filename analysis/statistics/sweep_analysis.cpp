@@ -140,14 +140,6 @@ void add_notes(SweepAnalysis& analysis) {
   }
 }
 
-/// For a protocol of version 2: every figure with a standard error.
-void add_task_drivers(SweepAnalysis& out) {
-  const SweepTable& table = out.table;
-  for (std::size_t c = table.parameters.size(); c + 1 < table.columns.size(); c += 2)
-    out.drivers.push_back(
-        drivers_of(table, table.columns[c], table.values[c], table.values[c + 1], out.seed));
-}
-
 }  // namespace
 
 PatternShare pattern_share(const SweepTable& table, const std::string& expression) {
@@ -194,9 +186,11 @@ SweepAnalysis analyze_sweep(SweepTable table, const std::string& pattern,
     const std::vector<double>& gains = out.table.values[*out.table.column("gain_" + shape)];
     const std::vector<double>& errors = out.table.values[*out.table.column("gain_se_" + shape)];
     out.gains.push_back(spread_of(gains, errors));
-    out.drivers.push_back(drivers_of(out.table, "gain_" + shape, gains, errors, out.seed));
   }
-  if (out.table.shapes.empty()) add_task_drivers(out);
+  for (const data::EstimateColumns& one : out.table.estimates)
+    out.drivers.push_back(drivers_of(out.table, one.estimate,
+                                     out.table.values[*out.table.column(one.estimate)],
+                                     out.table.values[*out.table.column(one.error)], out.seed));
   if (out.pattern)
     out.drivers.push_back(drivers_of(out.table, "pattern", out.pattern->at, {}, out.seed));
   add_notes(out);

@@ -63,7 +63,7 @@ struct TaskGroupResults {
 TaskGroupResults group_models(const std::vector<TaskCell>& cells,
                               const std::vector<TaskComparison>& individual);
 
-/// Names who has no figure of single fits. \param groups  with those figures
+/// Lists the participants without a figure of single fits. \param groups  with those figures
 void name_left_out(const std::vector<TaskCell>& cells, const std::vector<TaskGroup>& groups,
                    TaskGroupResults& results);
 

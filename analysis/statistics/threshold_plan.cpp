@@ -19,7 +19,7 @@ namespace {
 constexpr int kPlanLevels = 7;
 constexpr std::size_t kPlanShapes = 4;
 
-/// What a study says about the difference.
+/// The difference that a study finds.
 struct PlannedOutcome {
   bool determined = false, found = false;
   double estimate = 0;

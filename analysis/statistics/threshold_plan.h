@@ -25,7 +25,7 @@ enum class PlannedMeasure {
   adaptation    ///< in clamp trials
 };
 
-/// What an effect is a difference of. All measures but those of movements: of conditions.
+/// The contrast of an effect. Only movements may contrast groups, or a condition and zero.
 enum class PlannedContrast {
   conditions,  ///< the same participants under a second and a first condition
   groups,      ///< the second minus the first group of participants

@@ -5,6 +5,8 @@
 #include <cctype>
 #include <string>
 
+#include "data/base/words.h"
+
 namespace palpate {
 namespace {
 
@@ -150,13 +152,6 @@ constexpr std::array kColumnNames = std::to_array<std::string_view>({"adaptation
                                                                      "trial_type"});
 
 }  // namespace
-
-std::string lower_case(std::string_view name) {
-  std::string small(name);
-  std::ranges::transform(small, small.begin(),
-                         [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return small;
-}
 
 bool is_column_name(std::string_view name) {
   return std::ranges::binary_search(kColumnNames, lower_case(name));

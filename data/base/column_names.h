@@ -1,13 +1,10 @@
 #pragma once
 // The columns that tables of this program have, whatever the study: no factor has such a name.
 
-#include <string>
 #include <string_view>
 
 namespace palpate {
 
-/// A name as columns are compared: without capitals.
-std::string lower_case(std::string_view name);
 /// Whether a table has such a column, in small letters or capitals.
 bool is_column_name(std::string_view name);
 

@@ -21,10 +21,10 @@ std::int64_t difference(std::int64_t a, std::int64_t b) {
 
 /// The factors of all protocols, each once, with the levels of all; a level that protocols set in
 /// different ways has all of them.
-std::vector<StoredFactor> factors_of(const std::vector<ProtocolInfo>& protocols) {
+std::vector<StoredFactor> factors_of(const std::vector<StoredProtocol>& protocols) {
   std::vector<StoredFactor> out;
-  for (const ProtocolInfo& protocol : protocols) {
-    for (const StoredFactor& factor : read_stored_protocol(protocol.text).factors) {
+  for (const StoredProtocol& protocol : protocols) {
+    for (const StoredFactor& factor : protocol.factors) {
       auto known = std::ranges::find(out, factor.name, &StoredFactor::name);
       if (known == out.end()) known = out.insert(out.end(), {factor.name, {}});
       for (const auto& level : factor.levels) {
@@ -41,10 +41,10 @@ std::vector<StoredFactor> factors_of(const std::vector<ProtocolInfo>& protocols)
 }
 
 /// The dimensions of the levels of all protocols, each once.
-std::vector<std::string> dimensions_of(const std::vector<ProtocolInfo>& protocols) {
+std::vector<std::string> dimensions_of(const std::vector<StoredProtocol>& protocols) {
   std::vector<std::string> out;
-  for (const ProtocolInfo& protocol : protocols) {
-    for (const StoredBlock& block : read_stored_protocol(protocol.text).blocks) {
+  for (const StoredProtocol& protocol : protocols) {
+    for (const StoredBlock& block : protocol.blocks) {
       for (const std::string& name : block.dimensions)
         if (std::ranges::find(out, name) == out.end()) out.push_back(name);
     }
@@ -52,38 +52,23 @@ std::vector<std::string> dimensions_of(const std::vector<ProtocolInfo>& protocol
   return out;
 }
 
-std::vector<std::string> texts_of(const std::vector<ProtocolInfo>& protocols) {
-  std::vector<std::string> out;
-  out.reserve(protocols.size());
-  for (const ProtocolInfo& protocol : protocols) out.push_back(protocol.text);
-  return out;
-}
-
-bool have_reaches(const std::vector<ProtocolInfo>& protocols) {
-  const auto reaches = [](const StoredBlock& block) { return block.task == "reach"; };
-  return std::ranges::any_of(protocols, [&](const ProtocolInfo& protocol) {
-    return std::ranges::any_of(read_stored_protocol(protocol.text).blocks, reaches);
-  });
-}
-
-/// Whether any protocol has something.
-bool have(const std::vector<ProtocolInfo>& protocols, bool StoredProtocol::*what) {
-  return std::ranges::any_of(protocols, [what](const ProtocolInfo& protocol) {
-    return read_stored_protocol(protocol.text).*what;
-  });
-}
-
 }  // namespace
 
 ExportClock::ExportClock(const std::vector<ProtocolInfo>& protocols, Times times)
-    : times_(times),
-      tasks_(have_blocks(texts_of(protocols))),
-      reaches_(have_reaches(protocols)),
-      seen_(have(protocols, &StoredProtocol::has_view)),
-      heard_(have(protocols, &StoredProtocol::has_sound)),
-      groups_(protocols),
-      factors_(factors_of(protocols)),
-      dimensions_(dimensions_of(protocols)) {}
+    : times_(times), groups_(protocols) {
+  std::vector<StoredProtocol> stored;
+  for (const ProtocolInfo& protocol : protocols)
+    stored.push_back(read_stored_protocol(protocol.text));
+  for (const StoredProtocol& protocol : stored) {
+    tasks_ |= !protocol.blocks.empty();
+    reaches_ |=
+        std::ranges::find(protocol.blocks, "reach", &StoredBlock::task) != protocol.blocks.end();
+    seen_ |= protocol.has_view;
+    heard_ |= protocol.has_sound;
+  }
+  factors_ = factors_of(stored);
+  dimensions_ = dimensions_of(stored);
+}
 
 ExportClock::ExportClock(Store& store, Times times) : ExportClock(store.protocols(), times) {
   torque_ = TorqueNotes(store);

@@ -5,6 +5,7 @@
 #include <span>
 #include <string_view>
 
+#include "data/base/words.h"
 #include "data/export/delimited_row.h"
 #include "data/files/text_sink.h"
 
@@ -36,13 +37,6 @@ std::string only_alphanumeric(std::string_view text) {
   return kept;
 }
 
-std::string lower(std::string text) {
-  for (char& c : text) {
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  }
-  return text;
-}
-
 /// File name in the protocol (any path) -> a unique portable base name in the dataset.
 std::map<std::string, std::string> file_names(const std::vector<ProtocolFile>& files) {
   constexpr std::size_t kLongest = 100;
@@ -56,7 +50,7 @@ std::map<std::string, std::string> file_names(const std::vector<ProtocolFile>& f
     if (name.empty() || name[0] == '.') name = "_" + name;
     if (name.size() > kLongest) name.erase(0, name.size() - kLongest);
     std::string unique = name;
-    for (int k = 2; !taken.insert(lower(unique)).second; ++k) {
+    for (int k = 2; !taken.insert(lower_case(unique)).second; ++k) {
       unique = std::to_string(k) + "_" + name;
     }
     names[file.name] = unique;
@@ -126,10 +120,10 @@ std::map<std::string, StudyLabel> label_protocols(Store& store, const ExportSett
     if (study.label.empty()) study.label = "task";
     if (settings.facts) study.facts = settings.facts(protocol);
     study.files = file_names(store.files(protocol.sha256));
-    ++uses[lower(study.label)];
+    ++uses[lower_case(study.label)];
   }
   for (auto& [sha256, study] : labels) {
-    if (uses[lower(study.label)] == 1) continue;
+    if (uses[lower_case(study.label)] == 1) continue;
     study.label += "x" + only_alphanumeric(sha256);
   }
   return labels;
@@ -142,7 +136,7 @@ void require_exportable(Store& store) {
   std::map<std::string, std::string> seen;  // in lower case -> as it is
   for (const ProtocolInfo& protocol : store.protocols()) {
     for (const Participant& person : store.participants(protocol.sha256)) {
-      const auto [at, added] = seen.emplace(lower(person.code), person.code);
+      const auto [at, added] = seen.emplace(lower_case(person.code), person.code);
       if (added || at->second == person.code) continue;
       throw StoreRefused(store.path() + ": the participants " + at->second + " and " + person.code +
                          " differ in case only, which names of files in a dataset must not; "

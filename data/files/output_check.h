@@ -30,8 +30,8 @@ std::optional<int> descriptor_of_path(const std::string& path);
 /// -f) reads like a full disk
 std::string write_fault(int error);
 
-/// Refuses "-" where a file or folder is to be written: a file of that name surprises who meant a
-/// stream. \throws StoreRefused
+/// Refuses "-" as the name of a file or folder to be written: its user expects a stream.
+/// \throws StoreRefused
 void require_name(const std::string& path);
 
 /// Files that must not be overwritten, each with the reason: inputs and other outputs of a command.

@@ -1,5 +1,5 @@
 #pragma once
-// What remains after a withdrawal: copies that it does not remove, and tombstones (salted hashes of
+// Remains of a withdrawal: copies that it does not remove, and tombstones (salted hashes of
 // withdrawn codes). enrol refuses and merge excludes a code with a tombstone.
 
 #include <SQLiteCpp/Database.h>

@@ -40,7 +40,7 @@ std::size_t most_unanswered(const TaskBlock& block);
 std::vector<std::vector<int>> shared_track_order(const Protocol& protocol, int participant_number,
                                                  int block);
 
-/// What the seed determines of a trial of an adaptive block, whatever the answers are.
+/// The part of a trial of an adaptive block that the seed determines, whatever the answers are.
 struct DrawnTrial {
   bool catch_trial = false;
   int position = 0;  ///< of the comparison, from 0

@@ -142,6 +142,26 @@ void for_each_stimulus_at_points(const TaskBlock& block, Visit visit) {
   }
 }
 
+/// A stimulus's own number at a place; none: it lacks one.
+std::optional<double> own_number(const Protocol& protocol, const LevelTarget& target,
+                                 int stimulus) {
+  if (target.orientation) return 0;
+  const json value =
+      palpate::read_json(protocol.stimulus_texts[static_cast<std::size_t>(stimulus)]);
+  try {
+    const json& number = value.at(json::json_pointer(target.pointer));
+    if (number.is_number()) return number.get<double>();
+  } catch (const json::exception&) {  // a default
+  }
+  const stimuli::Material& material =
+      protocol.stimuli[static_cast<std::size_t>(stimulus)].object.material;
+  if (target.pointer == "/stiffness_n_per_m") return material.stiffness;
+  if (target.pointer == "/damping_ns_per_m") return material.damping;
+  if (target.pointer == "/friction_static") return material.friction_static;
+  if (target.pointer == "/friction_dynamic") return material.friction_dynamic;
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::string level_text(double level) {
@@ -265,25 +285,6 @@ std::vector<DimensionRange> ranges_of(const TaskBlock& block) {
 std::optional<double> own_level(const Protocol& protocol, const TaskBlock& block, int stimulus) {
   if (!block.level) return std::nullopt;
   return own_number(protocol, *block.level, stimulus);
-}
-
-std::optional<double> own_number(const Protocol& protocol, const LevelTarget& target,
-                                 int stimulus) {
-  if (target.orientation) return 0;
-  const json value =
-      palpate::read_json(protocol.stimulus_texts[static_cast<std::size_t>(stimulus)]);
-  try {
-    const json& number = value.at(json::json_pointer(target.pointer));
-    if (number.is_number()) return number.get<double>();
-  } catch (const json::exception&) {  // a default
-  }
-  const stimuli::Material& material =
-      protocol.stimuli[static_cast<std::size_t>(stimulus)].object.material;
-  if (target.pointer == "/stiffness_n_per_m") return material.stiffness;
-  if (target.pointer == "/damping_ns_per_m") return material.damping;
-  if (target.pointer == "/friction_static") return material.friction_static;
-  if (target.pointer == "/friction_dynamic") return material.friction_dynamic;
-  return std::nullopt;
 }
 
 std::vector<double> levels_of(const TaskBlock& block) {

@@ -57,8 +57,6 @@ std::vector<DimensionRange> ranges_of(const TaskBlock& block);
 /// first trial. Ascending, each once; empty: nothing is varied.
 std::vector<double> levels_of(const TaskBlock& block);
 
-/// A stimulus's own number at a place; none: it lacks one.
-std::optional<double> own_number(const Protocol& protocol, const LevelTarget& target, int stimulus);
 /// A stimulus's own level; none: it lacks that number.
 std::optional<double> own_level(const Protocol& protocol, const TaskBlock& block, int stimulus);
 

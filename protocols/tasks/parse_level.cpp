@@ -1,4 +1,5 @@
-// What a block varies from trial to trial: one number of its stimuli, or several.
+// Reads the level of a block: one number of its stimuli that varies from trial to trial, or
+// several.
 
 #include <algorithm>
 #include <cstddef>
@@ -8,6 +9,7 @@
 #include <utility>
 
 #include "data/base/column_names.h"
+#include "data/base/words.h"
 #include "protocols/parse_scene.h"
 #include "protocols/tasks/levels.h"
 #include "protocols/tasks/parse_blocks.h"

@@ -271,7 +271,7 @@ void read_place(ObjectReader& function, const char* key, const Dimensions& dimen
     place = static_cast<std::size_t>(found - dimensions.begin());
 }
 
-/// The only dimension of which something is true; none: several, or none.
+/// The one dimension that satisfies `is`; nullopt for zero or several.
 template <class Is>
 std::optional<std::size_t> only(const Dimensions& dimensions, Is is) {
   if (std::ranges::count_if(dimensions, is) != 1) return std::nullopt;

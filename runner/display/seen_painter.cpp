@@ -53,8 +53,7 @@ void main() {
   result = sum / weights;
 })";
 
-}  // namespace
-
+/// px, sd of a blur of a trial in a picture of this width; 0: none.
 double blur_pixels(const SeenTrial& trial, int width) {
   if (!(trial.seen.blur_deg > 0)) return 0;
   const protocols::ViewSpec& view = trial.view;
@@ -64,6 +63,8 @@ double blur_pixels(const SeenTrial& trial, int width) {
   return std::tan(trial.seen.blur_deg * std::numbers::pi / 180) * distance * width /
          glm::length(across);
 }
+
+}  // namespace
 
 SeenPainter::SeenPainter()
     : renderer_(SceneRenderer::live_quality()),
@@ -83,7 +84,7 @@ SeenPainter::~SeenPainter() {
   glDeleteVertexArrays(1, &vertices_);
 }
 
-/// What is seen in a mirror is flipped as a whole, text and patch as well.
+/// A picture for a mirror is flipped as a whole, text and patch as well.
 void SeenPainter::draw_layer(Layer layer, const protocols::ViewSpec& view) const {
   const bool across = view.mirror == protocols::Mirror::horizontal,
              up = view.mirror == protocols::Mirror::vertical;

@@ -61,7 +61,4 @@ class SeenPainter {
   int blur_width_ = 0, blur_height_ = 0;
 };
 
-/// px, sd of a blur of a trial in a picture of this width; 0: none.
-double blur_pixels(const SeenTrial& trial, int width);
-
 }  // namespace palpate::runner::display

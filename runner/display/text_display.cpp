@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "data/base/text.h"
+#include "data/base/words.h"
 #include "runner/display/console_words.h"
 
 namespace palpate::runner::display {
@@ -48,13 +49,6 @@ std::string_view trimmed(std::string_view text) {
   while (!text.empty() && text.front() == ' ') text.remove_prefix(1);
   while (!text.empty() && text.back() == ' ') text.remove_suffix(1);
   return text;
-}
-
-/// Commands are not case-sensitive.
-std::string lower(std::string_view text) {
-  std::string out(text);
-  for (char& c : out) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c;
-  return out;
 }
 
 constexpr Page::Kind kText = Page::Kind::text;
@@ -249,7 +243,7 @@ class TextDisplay final : public DisplayLoop {
 /// "pause", "note TEXT", ... without the colon. Unknown: kind note with an empty text.
 ConsoleCommand parse_text_command(std::string_view line, std::int64_t time_ns) {
   line = trimmed(line);
-  const std::string said = lower(line);
+  const std::string said = lower_case(line);  // commands are not case-sensitive
   for (const CommandText& word : kCommands) {
     if (said != word.line) continue;
     return {word.kind, word.kind == Kind::emergency_zero ? ":zero" : "", time_ns};

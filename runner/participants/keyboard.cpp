@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "data/base/text.h"
+#include "data/base/words.h"
 #include "protocols/answer_keys.h"
 #include "protocols/tasks/levels.h"
 #include "runner/participants/seen_trial.h"
@@ -87,11 +88,6 @@ std::string range_text(std::optional<double> least, std::optional<double> most) 
   if (least && most) return " (" + text(*least) + " \u2013 " + text(*most) + ")";
   if (least) return " (\u2265 " + text(*least) + ")";
   return most ? " (\u2264 " + text(*most) + ")" : "";
-}
-
-std::string lower_case(std::string text) {
-  for (char& c : text) c = c >= 'A' && c <= 'Z' ? static_cast<char>(c + ('a' - 'A')) : c;
-  return text;
 }
 
 std::optional<double> number_in(const std::string& typed, std::optional<double> least,

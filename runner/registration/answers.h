@@ -37,7 +37,7 @@ class StudyAnswers {
   /// Whether the participant learns whether an answer was right; "": never.
   virtual std::string feedback() const = 0;
   virtual std::vector<Paragraph> design() const = 0;
-  /// What is drawn, and what of it is fixed, before the checksums of the orders.
+  /// The random draws, and those that are fixed, before the checksums of the orders.
   virtual std::vector<Paragraph> randomisation() const = 0;
   virtual std::vector<Paragraph> sample_size() const = 0;
   /// When a session's blocks end, beside the study's stopping rule; empty: their length is fixed.
@@ -54,11 +54,11 @@ class StudyAnswers {
   virtual std::string rehearsal() const = 0;
   /// Studies as the plan expects them.
   virtual std::unique_ptr<PlannedStudies> planned() const = 0;
-  /// What simulated/ holds, for its README.
+  /// The contents of simulated/, for its README.
   virtual std::string simulated() const = 0;
 
   std::vector<Paragraph> rationale() const;
-  /// What the rehearsed studies without the planned effect have: "no effect".
+  /// The name of the rehearsed studies without the planned effect: "no effect".
   std::string contrast() const;
 
  protected:

@@ -42,7 +42,7 @@ using protocols::Presence;
 constexpr std::size_t kMostListed = 1'000'000, kMostStudyText = 16'000'000, kMostStudyWord = 10'000;
 constexpr double kMostStudyCount = 1e9;
 
-/// What record.json says.
+/// The contents of record.json.
 struct StatedStudy {
   analysis::StudyRecord record;
   std::size_t removed = 0;

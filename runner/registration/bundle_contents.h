@@ -1,5 +1,5 @@
 #pragma once
-// What a bundle holds: its base (trials, what they leave out, about.json, and a registration if
+// Contents of a bundle: its base (trials, what they leave out, about.json, and a registration if
 // there was one) and the files that follow from it. 'palpate bundle' writes them, '--verify' makes
 // them again.
 
@@ -51,7 +51,7 @@ struct CheckedStudy {
   StudyCheck check;
 };
 
-/// What the derived files are made of.
+/// The facts from which the derived files are made.
 struct BundleFacts {
   data::StudyAbout about;
   std::string format;                    ///< "psych-ds", "bids"

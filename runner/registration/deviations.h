@@ -36,7 +36,7 @@ struct StudyParticipant {
   std::vector<study::ShownTrial> shown;  ///< practice or not, in their order
 };
 
-/// What of a study is compared, from a database or a bundle.
+/// The part of a study that is compared, from a database or a bundle.
 struct StudyData {
   std::vector<data::ProtocolInfo> protocols;
   std::vector<StudyParticipant> participants;  ///< with trials, practice or not

@@ -47,8 +47,8 @@ Form read_form(const std::string& text, const std::string& file);
 std::string markdown_as_made(const Form& form, const std::string& digest);
 std::string osf_as_made(const Form& form, const std::string& digest);
 
-/// What differs outside of the fields, a line each. Ends of lines and the space before them do not
-/// count. A filled-in text may not hide what follows: no HTML, no heading, no fence.
+/// The differences outside of the fields, a line each. Ends of lines and the space before them do
+/// not count. A filled-in text may not hide what follows: no HTML, no heading, no fence.
 std::vector<std::string> markdown_changes(const Form& form, const std::string& digest,
                                           const std::string& text);
 std::vector<std::string> osf_changes(const Form& form, const std::string& digest,

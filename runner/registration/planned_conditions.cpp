@@ -224,6 +224,11 @@ void require_trials(const analysis::PlanRecord& plan, const std::string& path,
       "; this one is for " + others + ": plan again with --trials " + std::to_string(trials));
 }
 
+/// The contrast of a plan of another measure than times.
+analysis::PlannedContrast contrast_of(const analysis::PlanRecord& plan) {
+  return plan.measure() == nullptr ? PlannedContrast::conditions : plan.measure()->contrast;
+}
+
 /// Groups of a plan are two. Movements under one condition differ from nothing but 0.
 void require_contrast(const analysis::PlanRecord& plan, const std::string& path,
                       const Protocol& protocol) {
@@ -283,10 +288,6 @@ bool PlannedConditions::is_second(const protocols::Trial& trial, std::size_t gro
   if (by_renderer) return trial.renderer == protocols::RendererKind::ray;
   if (!factor.empty()) return !first_stimuli.contains(trial.stimulus);
   return trial.task_block != blocks.front() || !first_stimuli.contains(trial.stimulus);
-}
-
-analysis::PlannedContrast contrast_of(const analysis::PlanRecord& plan) {
-  return plan.measure() == nullptr ? PlannedContrast::conditions : plan.measure()->contrast;
 }
 
 PlannedConditions conditions_of(const Protocol& protocol, const analysis::PlanRecord& plan) {

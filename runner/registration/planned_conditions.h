@@ -28,8 +28,6 @@ struct PlannedConditions {
   /// \param group  index of the participant's
   bool is_second(const protocols::Trial& trial, std::size_t group) const;
 };
-/// The contrast of a plan of another measure than times.
-analysis::PlannedContrast contrast_of(const analysis::PlanRecord& plan);
 PlannedConditions conditions_of(const protocols::Protocol& protocol,
                                 const analysis::PlanRecord& plan);
 

@@ -78,7 +78,7 @@ VerdictCounts read_counts(ObjectReader& reader, const char* key) {
   return out;
 }
 
-/// What registration.json says that follows from other values.
+/// The values in registration.json that follow from others.
 struct Stated {
   std::vector<double> look_alphas;
   std::string protocol_sha256, plan_sha256;

@@ -71,7 +71,7 @@ std::optional<analysis::Spending> spending_of(const std::string& name);
 /// Of the participants, ascending.
 std::vector<int> planned_numbers(const Registration& registration);
 
-/// What "alpha" is in a hypothesis when a study has so many participants: that of the look, if
+/// The value of "alpha" in a hypothesis when a study has so many participants: that of the look, if
 /// looks are planned; NaN: none is planned then.
 double alpha_at(const Registration& registration, std::size_t participants);
 
@@ -93,7 +93,7 @@ std::string registration_digest(const std::string& folder);
 /// Reads an option --digest. \throws UsageError: not 64 digits
 std::string read_digest(const std::string& option);
 
-/// What is in the files to fill in.
+/// The contents of the files to fill in.
 struct FilledIn {
   std::vector<std::string> files;    ///< that have changed since they were made
   std::vector<std::string> changes;  ///< outside of the fields, a line each
@@ -106,7 +106,8 @@ FilledIn filled_in(const std::string& folder, const Registration& registration);
 /// has no registration
 Registration read_registration(const std::string& folder);
 
-/// What registration.json itself says, without the other files. \throws InputError with every fault
+/// The contents of registration.json itself, without the other files. \throws InputError with every
+/// fault
 Registration parse_statement(const std::string& text, const std::string& file);
 
 /// Requires tasks whose trials palpate chooses, or two renderers to compare. \throws UsageError

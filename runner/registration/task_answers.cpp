@@ -82,7 +82,7 @@ void add_once(const std::string& name, std::vector<std::string>& names) {
   if (std::ranges::find(names, name) == names.end()) names.push_back(name);
 }
 
-/// What the participant does.
+/// The participant's task, in words.
 std::string question_of(TaskKind task) {
   switch (task) {
     case TaskKind::identify:

@@ -15,6 +15,7 @@
 #include <utility>
 
 #include "data/base/text.h"
+#include "data/base/words.h"
 #include "data/files/utc.h"
 #include "data/record.h"
 #include "data/store/store.h"
@@ -35,13 +36,10 @@ namespace {
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
-
 /// Removes easily misread differences: case, O and 0, I and l and 1, leading zeros of a number.
 std::string read_alike(const std::string& code) {
   std::string all;
-  for (char c : code) {
-    c = lower(c);
+  for (const char c : lower_case(code)) {
     all += c == 'o' ? '0' : c == 'i' || c == 'l' ? '1' : c;
   }
   std::string out;
@@ -59,7 +57,7 @@ struct CodeParts {
 
 CodeParts parts_of(const std::string& code) {
   CodeParts parts;
-  for (const char c : code) (is_digit(c) ? parts.digits : parts.letters) += lower(c);
+  for (const char c : lower_case(code)) (is_digit(c) ? parts.digits : parts.letters) += c;
   return parts;
 }
 
@@ -153,6 +151,14 @@ int session_due(data::Store& store, const data::Participant& participant,
   if (session > 1 && day == data::format_utc(utc_now()).substr(0, 10))
     std::fprintf(stderr, "session %d was also today\n", session - 1);
   return session;
+}
+
+/// \param when  in words; empty: not stated
+[[noreturn]] void throw_withdrawn(const std::string& code, const std::string& when) {
+  throw UsageError("participant " + code + " has withdrawn" +
+                   (when.empty() ? "" : " (" + when + ")") +
+                   " and cannot resume. If the participant asks to take part again, add "
+                   "--after-withdrawal; 'palpate forget' removes the data on record");
 }
 
 /// \throws UsageError: the participant has withdrawn, and no option acknowledges it.
@@ -430,13 +436,6 @@ std::string withdrawn_when(data::Store& store, const std::string& code) {
     if (of_that_run && note.text.starts_with(kEndNote)) when_ns = utc_of(note.utc);
   }
   return spoken_time(when_ns, utc_now());
-}
-
-void throw_withdrawn(const std::string& code, const std::string& when) {
-  throw UsageError("participant " + code + " has withdrawn" +
-                   (when.empty() ? "" : " (" + when + ")") +
-                   " and cannot resume. If the participant asks to take part again, add "
-                   "--after-withdrawal; 'palpate forget' removes the data on record");
 }
 
 int choose_session(data::Store& store, const data::Participant& participant,

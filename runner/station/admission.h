@@ -38,9 +38,6 @@ std::string spoken_time(std::int64_t utc_ns, std::int64_t now_utc_ns);
 std::string resumption(data::Store& store, const data::Participant& participant, int session,
                        const protocols::SessionPlan& plan);
 
-/// \param when  in words; empty: not stated
-[[noreturn]] void throw_withdrawn(const std::string& code, const std::string& when);
-
 /// The time of the withdrawal, in words; empty: none.
 std::string withdrawn_when(data::Store& store, const std::string& code);
 

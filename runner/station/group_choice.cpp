@@ -31,7 +31,7 @@ void check_number(const std::string& who, int number, std::size_t wanted,
                    groups.name(number));
 }
 
-/// The group with the fewest participants who have completed the study; of equal ones that of the
+/// The group with the fewest participants who have completed the study. Ties go to the group of the
 /// smallest unused number.
 std::size_t least_filled(const GroupAssignment& groups, const GroupFacts& facts) {
   std::size_t least = 0;

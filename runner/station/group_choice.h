@@ -11,7 +11,7 @@
 
 namespace palpate::runner::station {
 
-/// What the choice depends on.
+/// The facts that the choice depends on.
 struct GroupFacts {
   std::optional<int> enrolled = {};  ///< number of a participant who is known
   std::set<int> taken = {};          ///< numbers of others

@@ -1,5 +1,5 @@
 #pragma once
-// What `palpate validate` finds in a file, as values: faults, a summary, which devices can show it
+// Results of `palpate validate` as values: faults, a summary, which devices can show it
 // and why not, how long a session takes.
 
 #include <cstddef>
@@ -25,7 +25,7 @@ struct Verdict {
   std::optional<devices::ChainTiming> chain;      ///< the measured delay that was counted
 };
 
-/// What a device is told of a protocol before it is opened.
+/// The facts of a protocol that a device needs before it is opened.
 servo::DeviceConfig device_config(const protocols::Protocol& protocol);
 
 /// Every kind of device, in the registry's order.

@@ -13,7 +13,7 @@
 namespace palpate::runner::sweep {
 namespace {
 
-// What a stream of the sweep's seed is for.
+// The purposes of streams of the sweep's seed.
 // Sobol's shift has 3 (data/base/sobol.cpp).
 enum Use : std::uint64_t { kPermutation = 1, kPlaceWithin = 2 };
 

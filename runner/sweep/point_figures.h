@@ -22,7 +22,7 @@ class PointFigures {
   virtual std::vector<std::optional<double>> figures() const = 0;
 };
 
-/// What a sweep of a kind of study tells.
+/// The figures that a sweep computes for a kind of study.
 class SweptKind {
  public:
   virtual ~SweptKind() = default;

@@ -12,6 +12,7 @@
 #include "data/base/json_text.h"
 #include "data/base/random.h"
 #include "data/base/text.h"
+#include "data/base/words.h"
 #include "data/stored_protocol.h"
 #include "protocols/json_document.h"
 #include "runner/participants/simulated_settings.h"
@@ -109,12 +110,6 @@ std::uint64_t short_seed(std::uint64_t sweep_seed, std::int64_t point, std::uint
 std::string place_of(std::size_t parameter, const SweepParameter& one, std::size_t path) {
   const std::string place = child_pointer(child_pointer("/parameters", parameter), "path");
   return one.paths.size() == 1 ? place : child_pointer(place, path);
-}
-
-std::string listed(const std::vector<std::string>& words) {
-  std::string out;
-  for (const std::string& word : words) out += (out.empty() ? "" : ", ") + word;
-  return out;
 }
 
 std::string near_text(const json& document, const std::string& pointer) {

@@ -29,6 +29,7 @@ inline SweepTable table_of(const std::string& design,
     table.parameters.push_back("x" + std::to_string(p + 1));
   table.columns = table.parameters;
   table.columns.insert(table.columns.end(), {"gain_cone", "gain_se_cone"});
+  table.estimates = {{"gain_cone", "gain_se_cone"}};
   table.values.resize(table.columns.size());
   table.words.resize(table.parameters.size());
   for (const std::vector<double>& point : points) {

@@ -10,6 +10,7 @@
 
 #include "data/base/cell_name.h"
 #include "data/base/text.h"
+#include "data/base/words.h"
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "protocols/schedule.h"
@@ -51,12 +52,6 @@ void print_overlaps(const stimuli::ObjectSpec& object, const std::string& name,
         << "): " << printable(overlap) << "\n";
 }
 
-std::string list(const std::vector<std::string>& words) {
-  std::string text;
-  for (const std::string& word : words) text += (text.empty() ? "" : ", ") + word;
-  return text;
-}
-
 std::string time_in_words(double seconds) {
   std::ostringstream out;
   out << std::fixed << std::setprecision(0);
@@ -78,7 +73,7 @@ std::string heard(const protocols::Protocol& protocol) {
       sounding.push_back(stimulus.name);
   }
   std::ostringstream out;
-  if (!sounding.empty()) out << "  sounds      contacts of " << list(sounding) << "\n";
+  if (!sounding.empty()) out << "  sounds      contacts of " << listed(sounding) << "\n";
   if (!protocol.masking_noise) return out.str();
   out << "  noise       " << protocols::to_string(protocol.masking_noise->kind) << ", "
       << protocol.masking_noise->level_db << " dB re full scale, through headphones\n";
@@ -95,7 +90,7 @@ void print_task_summary(const protocols::Protocol& protocol, std::ostream& out) 
   }
   long long trials = 0;
   out << protocol.name << (protocol.title.empty() ? "" : ": " + printable(protocol.title))
-      << "\n  renderers   " << list(renderers) << "\n  stimuli     " << list(stimuli)
+      << "\n  renderers   " << listed(renderers) << "\n  stimuli     " << listed(stimuli)
       << "\n  blocks      " << protocol.blocks.size() << ", in " << protocol.sessions.count
       << (protocol.sessions.count == 1 ? " session" : " sessions")
       << (protocol.blocks_counterbalanced ? ", their order counterbalanced\n" : "\n");
@@ -113,7 +108,7 @@ void print_task_summary(const protocols::Protocol& protocol, std::ostream& out) 
   }
   const std::vector<std::string> typed = study::keyboard_parts(protocol);
   if (!typed.empty())
-    out << "  keyboard    needed beside a device's buttons for " << list(typed) << "\n";
+    out << "  keyboard    needed beside a device's buttons for " << listed(typed) << "\n";
   const station::Duration duration = station::duration_of(protocol);
   out << "  trials      at most " << trials << " for each participant\n  duration    about "
       << time_in_words(duration.usual) << ", at most " << time_in_words(duration.longest)
@@ -136,9 +131,9 @@ void print_summary(const protocols::Protocol& protocol, std::ostream& out) {
   const double trial = duration.usual / static_cast<double>(trials.size()) - protocol.home.rest;
 
   out << protocol.name << (protocol.title.empty() ? "" : ": " + printable(protocol.title)) << "\n"
-      << "  renderers   " << list(renderers) << " ("
+      << "  renderers   " << listed(renderers) << " ("
       << kOrders[static_cast<std::size_t>(protocol.renderer_order)] << ")\n"
-      << "  stimuli     " << list(stimuli) << "\n"
+      << "  stimuli     " << listed(stimuli) << "\n"
       << "  trials      " << counted << " for each participant ("
       << counted / static_cast<long long>(protocol.renderers.size()) << " with each renderer), "
       << trials.size() - static_cast<std::size_t>(counted) << " of practice and warm-up besides\n"
@@ -305,7 +300,7 @@ void print_protocol(const protocols::Protocol& protocol, SceneBuilder builder,
   const std::vector<std::string> built_in = protocols::built_in_texts(protocol);
   if (!built_in.empty())
     out << "  texts       built in, in English; a protocol in another language gives its own: "
-        << list(built_in) << "\n";
+        << listed(built_in) << "\n";
   for (const std::string& note : touch::stimulus_notes(protocol, builder))
     out << "  mesh        " << note << "\n";
   for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
