@@ -127,8 +127,8 @@ struct Soft {
   double density = 1000;  ///< kg/m^3
   double damping = 0.01;  ///< s; ratio of viscosity to elastic modulus
   Fixed fixed = Fixed::base;
-  std::vector<Vec3> points;  ///< m, local frame
-  int resolution = 10;       ///< elements along the longest side
+  std::vector<Vec3> points = {};  ///< m, local frame
+  int resolution = 10;            ///< elements along the longest side
 };
 
 /// An object that moves as a rigid body.

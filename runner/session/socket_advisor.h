@@ -40,9 +40,9 @@ namespace palpate::runner::session {
 
 // An external program that proposes the levels of adaptive blocks.
 
-/// What a program wants for the next trial: one of them.
+/// A program's wish for the next trial: one of these.
 struct Proposal {
-  std::optional<double> level;
+  std::optional<double> level = std::nullopt;
   protocols::LevelPoint point = {};  ///< of several dimensions
   bool finished = false;             ///< the block ends
 };

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <functional>
+#include <glm/geometric.hpp>
 #include <iostream>
 #include <span>
 #include <stdexcept>
@@ -217,6 +218,21 @@ void check_range(const char* option, int value, int low, int high) {
                    std::to_string(high) + ", not " + std::to_string(value));
 }
 
+/// The path of a scene's study. \throws InputError: a pose that no hand has
+std::vector<touch::TimedPose> compared_path(const std::string& path) {
+  constexpr double kFarthest = 1e6;  // m; the renderers take no pose beyond it (rendering/tick.h)
+  std::vector<touch::TimedPose> poses = touch::read_trajectory(path);
+  for (const touch::TimedPose& pose : poses) {
+    for (const Vec3& end : {pose.probe.tip, pose.probe.tail}) {
+      if (glm::length(end) <= kFarthest) continue;  // false for NaN
+      throw protocols::InputError({{path, "line " + std::to_string(pose.line),
+                                    "expected tip and tail within 1e6 m: methods are compared on "
+                                    "poses that a hand can have"}});
+    }
+  }
+  return poses;
+}
+
 /// `palpate accuracy SCENE.json`.
 void study_users_scene(const po::variables_map& values, output::Outputs& outputs) {
   const std::string path = values["scene"].as<std::string>();
@@ -232,7 +248,7 @@ void study_users_scene(const po::variables_map& values, output::Outputs& outputs
                      "not in fields");
   for (const stimuli::ObjectSpec& object : scene.spec.objects) outputs.protect(object);
   if (values.count("trajectory"))
-    scene.paths = {touch::read_trajectory(values["trajectory"].as<std::string>())};
+    scene.paths = {compared_path(values["trajectory"].as<std::string>())};
   evidence::SceneStudySettings settings;
   const std::string renderer = values["renderer"].as<std::string>();
   settings.ray = &touch::renderer_named(renderer) == &rendering::ray_renderer();
@@ -336,18 +352,18 @@ int accuracy_command(const std::vector<std::string>& args) {
   take("most-triangles", settings.most_triangles, 20, 1310720);
   if (values->count("jobs")) check_range("jobs", jobs, 1, 256);
   const bool unions = values->count("unions") > 0;
-  if (unions && !searching) throw UsageError("--unions: goes with --search");
+  if (unions && !searching) throw UsageError("--unions: requires --search");
   if (searching && !figure.empty()) throw UsageError("--figure: a search has no figure");
   output::Outputs outputs(*values, {"json", "figure", "report"}, {"scene", "trajectory"});
   if (values->count("scene")) {
     for (const char* other : {"search", "unions", "paths", "most-triangles", "jobs"}) {
       if (values->count(other))
-        throw UsageError("--" + std::string(other) + ": does not go with a scene");
+        throw UsageError("--" + std::string(other) + ": cannot be combined with a scene");
     }
     study_users_scene(*values, outputs);
     return 0;
   }
-  if (values->count("trajectory")) throw UsageError("--trajectory: goes with a scene");
+  if (values->count("trajectory")) throw UsageError("--trajectory: requires a scene");
   evidence::AccuracyReport report;
   if (jobs == 0) jobs = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   if (searching) {

@@ -13,9 +13,9 @@ namespace palpate::runner::evidence {
 /// A device on which a scene may buzz.
 struct BuzzingDevice {
   std::string name;
-  LoopSettings ends;      ///< damping, friction and resolution of each end; rate and delay
-  double delay = 0;       ///< s, from a reading to its force
-  bool measured = false;  ///< the delay was
+  LoopSettings ends = {};  ///< damping, friction and resolution of each end; rate and delay
+  double delay = 0;        ///< s, from a reading to its force
+  bool measured = false;   ///< the delay was
 };
 
 struct BoundaryReport {

@@ -39,9 +39,12 @@ std::vector<const SceneRow*> drawn_rows(const SceneStudy& study) {
 std::vector<std::string> how_to_read(const SceneStudy& study) {
   const auto count = [](std::size_t n) { return thousands(static_cast<long long>(n)); };
   std::vector<std::string> all;
-  all.push_back("Exact answer: " + study.truth + ". Of " + count(study.ticks) + " ticks, " +
-                count(study.touching) + " touch; " + count(study.unknown) +
-                " have no exact answer and are not compared.");
+  const std::string touching =
+      "Of " + count(study.ticks) + " ticks, " + count(study.touching) + " touch";
+  all.push_back(study.truth == "none"
+                    ? "Exact answer: none, so there are times alone. " + touching + "."
+                    : "Exact answer: " + study.truth + ". " + touching + "; " +
+                          count(study.unknown) + " have no exact answer and are not compared.");
   if (study.tried > 0) {
     all.push_back("The exact ideal tool was tried by winding number at " + count(study.tried) +
                   " ticks: inside at " + count(study.found_inside) + ".");

@@ -1,5 +1,5 @@
 #pragma once
-// What the features of a scene cost a tick: those that it has in nanoseconds, here and now; those
+// Cost of a scene's features in a tick: those that it has in nanoseconds, here and now; those
 // that it does not need in instructions, from a table that was measured once.
 
 #include <optional>

@@ -9,6 +9,7 @@
 #include <set>
 #include <utility>
 
+#include "data/base/words.h"
 #include "rendering/bodies/soft/soft_scene.h"
 #include "rendering/tool.h"
 #include "runner/evidence/accuracy/methods.h"
@@ -29,11 +30,13 @@ using stimuli::ShapeKind;
 
 constexpr std::size_t kMostTicks = 20'000;  // compared; the reference takes a millisecond for each
 constexpr std::size_t kMostObjects = 4;     // stroked
-constexpr int kFinestBall = 6, kFinestRim = 1024;
+// Of a reference for an analytic shape: 4 times finer than the scene's own mesh, so that its own
+// error is a sixteenth, at least the first and at most the second of these.
+constexpr int kFineBall = 6, kFinestBall = 8, kFineRim = 1024, kFinestRim = 4096;
 constexpr std::size_t kFewTriangles = 100;  // a coarser mesh of these is another object
 constexpr int kSmallSteps = 8;              // of a reference with bodies, in a tick
 
-/// What a method, or the truth, says of a tick.
+/// The result of a method, or the exact one, for a tick.
 struct Answer {
   bool touching = false, known = true, torque_defined = true;
   Vec3 force{0}, torque{0};
@@ -309,8 +312,11 @@ class ByPeer final : public Shower {
   std::vector<std::vector<Piece>> solids_;
 };
 
-/// Springs alone: what has an exact answer.
+/// Springs on smooth surfaces alone: they have an exact answer.
 ObjectSpec springs_of(ObjectSpec object) {
+  object.texture.reset();
+  object.fields.clear();
+  object.transient.reset();
   stimuli::Material& m = object.material;
   m.damping = m.friction_static = m.friction_dynamic = 0;
   for (stimuli::Layer& layer : m.layers) {
@@ -321,22 +327,36 @@ ObjectSpec springs_of(ObjectSpec object) {
   return object;
 }
 
-bool has_more_than_springs(const ObjectSpec& object) {
+/// Adds the names of what springs_of() leaves out.
+void name_left_out(const ObjectSpec& object, std::set<std::string>& names) {
   const stimuli::Material& m = object.material;
-  const auto more = [](const stimuli::Layer& layer) {
-    return layer.damping != 0 || layer.break_force.has_value();
-  };
-  return m.damping != 0 || m.has_friction() || std::ranges::any_of(m.layers, more) ||
-         std::ranges::any_of(object.parts, has_more_than_springs);
+  if (m.damping != 0) names.insert("damping");
+  if (m.has_friction()) names.insert("friction");
+  for (const stimuli::Layer& layer : m.layers) {
+    if (layer.damping != 0) names.insert("damping");
+    if (layer.break_force) names.insert("breaking");
+  }
+  if (object.texture) names.insert("texture");
+  if (!object.fields.empty()) names.insert("fields");
+  if (object.transient) names.insert("knocks");
+  for (const ObjectSpec& part : object.parts) name_left_out(part, names);
 }
 
-/// As fine as its analytic shape is worth.
-ObjectSpec finest(ObjectSpec object) {
+/// With so fine a mesh that its facets add little to an error. \param fine  cleared if it has none
+ObjectSpec finest(ObjectSpec object, bool& fine) {
   const stimuli::ShapeTraits traits = stimuli::traits_of(object.shape);
-  if (traits.subdivisions) object.subdivisions = std::max(object.subdivisions, kFinestBall);
-  if (traits.segments) object.segments = std::max(object.segments, kFinestRim);
+  if (traits.subdivisions) {
+    fine &= object.subdivisions + 2 <= kFinestBall;
+    object.subdivisions =
+        std::max(object.subdivisions, std::clamp(object.subdivisions + 2, kFineBall, kFinestBall));
+  }
+  if (traits.segments) {
+    fine &= 4 * object.segments <= kFinestRim;
+    object.segments =
+        std::max(object.segments, std::clamp(4 * object.segments, kFineRim, kFinestRim));
+  }
   if (object.soft && object.soft->resolution > 0) object.soft->resolution *= 2;
-  for (ObjectSpec& part : object.parts) part = finest(part);
+  for (ObjectSpec& part : object.parts) part = finest(part, fine);
   return object;
 }
 
@@ -398,18 +418,17 @@ class Study {
     out_.name = scene_.name;
     out_.renderer = renderer_.name();
     springs_ = scene_.spec;
-    bool more = false;
+    std::set<std::string> left_out;
     for (ObjectSpec& object : springs_.objects) {
-      more |= has_more_than_springs(object);
+      name_left_out(object, left_out);
       bodies_ |= object.body.has_value();
       soft_ |= object.soft.has_value();
       object = springs_of(object);
     }
-    if (more) {
-      out_.notes.emplace_back(
-          "Errors are those of springs: damping, friction and breaking are left out of them, not "
-          "of "
-          "the times.");
+    if (!left_out.empty()) {
+      out_.notes.push_back(
+          "Errors are those of springs on smooth surfaces. Left out of them, not of the times: " +
+          listed({left_out.begin(), left_out.end()}) + ".");
     }
     if (scene_.spec.reach) {
       out_.notes.emplace_back(
@@ -459,10 +478,16 @@ class Study {
 
   void set_truth() {
     protocols::SceneSpec fine = springs_;
-    bool refined = false;
+    bool refined = false, far_finer = true;
     for (ObjectSpec& object : fine.objects) {
       refined |= is_tessellated(object) && !object.soft;
-      object = finest(object);
+      object = finest(object, far_finer);
+    }
+    if (!far_finer && !soft_) {
+      out_.notes.emplace_back(
+          "A mesh of this scene is so fine that the one it is compared with is not 4 times finer: "
+          "errors "
+          "leave out a part of that of its facets.");
     }
     if (bodies_ || soft_) {
       const bool fixed_elements = std::ranges::any_of(springs_.objects, [](const ObjectSpec& one) {
@@ -472,7 +497,7 @@ class Study {
         out_.truth = "none";
         out_.notes.emplace_back(
             "No errors: the elements of a soft body cannot be made finer here (a .msh file, or no "
-            "\"resolution\").");
+            "\"resolution\": state one for a shape).");
         return;
       }
       out_.truth = soft_ ? "this renderer with twice as many elements along each side"
@@ -778,10 +803,10 @@ class Study {
       if (quickest == nullptr || row.median_ns < quickest->median_ns) quickest = &row;
     }
     char text[400];
-    if (nearest == nullptr) {
-      out_.choose = out_.touching == 0
-                        ? "Nothing to choose: nothing is touched on this path."
-                        : "Nothing to choose: no exact answer is known for this scene.";
+    if (out_.touching == 0) {
+      out_.choose = "Nothing to choose: nothing is touched on this path.";
+    } else if (nearest == nullptr) {
+      out_.choose = "Nothing to choose: no exact answer is known for this scene.";
     } else if (quickest != nullptr) {
       std::snprintf(
           text, sizeof text,

@@ -54,19 +54,19 @@ StageCost soft_stage(const rendering::SoftObject& object) {
 /// The cost of bodies beside the contact law, with all of them in motion and the probe far away.
 StageCost bodies_stage(const rendering::Scene& scene, const rendering::Renderer& renderer,
                        const rendering::MovingSummary& moving) {
-  constexpr int kTicks = 500;
+  constexpr int kIdleTicks = 500;
   const auto now = [] { return std::chrono::steady_clock::now(); };
   rendering::RenderState state = scene.initial_state();
   const rendering::LineProbe far{Vec3(1e3), Vec3(1e3) + Vec3(0, 0, 0.12)};
   const auto began = now();
-  for (int i = 0; i < kTicks; ++i) renderer.tick(scene, state, far, 1e-3);
+  for (int i = 0; i < kIdleTicks; ++i) renderer.tick(scene, state, far, 1e-3);
   const std::chrono::duration<double, std::nano> took = now() - began;
   std::ostringstream text;
   text.precision(3);
   text << moving.bodies << (moving.bodies == 1 ? " object moves" : " objects move") << " ("
        << moving.lightest << " to " << moving.heaviest << " kg), " << moving.obstacles
        << " stand still; " << moving.part_pairs << " pairs of convex parts or surfaces may meet; "
-       << 1e-3 * took.count() / kTicks
+       << 1e-3 * took.count() / kIdleTicks
        << " us a tick over the first half second without the probe; what rests sleeps";
   return {{"moving bodies", StageTime::tick, true, text.str()}, std::nullopt};
 }

@@ -1,5 +1,6 @@
 """palpate accuracy, stability and render --explain of a user's own scene. Usage: scene_studies_test.py PALPATE"""
 
+import csv
 import json
 import math
 import unittest
@@ -115,6 +116,51 @@ class Accuracy(CommandCase):
         law = self.study(scene, "--renderer", "point", "--trajectory", path)[0]["rows"][0]
         self.assertGreater(law["ticks_compared"], 20)
         self.assertLess(law["force_error_max_n"], 1e-6)
+
+    def test_textures_fields_and_knocks_are_left_out_of_errors(self):
+        cube = dict(CUBE["objects"][0], texture={"kind": "sine", "period_m": 0.002, "depth_m": 0.0002},
+                    fields=[{"kind": "viscous", "damping_ns_per_m": 2}], damping_ns_per_m=1)
+        result, _ = self.study(self.file("t.json", {"objects": [cube]}), "--ticks", 300)
+        self.assertLess(result["rows"][0]["force_error_max_n"], 1e-5)
+        self.assertTrue(any(note.endswith("not of the times: damping, fields, texture.") for note in result["notes"]))
+
+    def test_a_fine_ball_is_held_against_a_ball(self):
+        radius, depth, stiffness = 0.03, 0.0015, 700
+        scene = self.file("b.json", {"objects": [{"shape": "sphere", "radius_m": radius, "subdivisions": 6,
+                                                  "stiffness_n_per_m": stiffness}]})
+        tips = []
+        for i in range(300):
+            height = radius + 1e-3 - 1e-4 * i if i < 25 else radius - depth
+            angle = max(0, i - 25) * 3e-3
+            tips.append([height * math.sin(angle), 0.2 * height * math.sin(angle), height * math.cos(angle)])
+        path = self.file("p.csv", "t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n" + "".join(
+            f"{i / 1000},{x!r},{y!r},{z!r},{x!r},{y!r},{z + 0.12!r}\n" for i, (x, y, z) in enumerate(tips)))
+        law = self.study(scene, "--renderer", "point", "--trajectory", path)[0]["rows"][0]
+        self.palpate("render", "--scene", scene, "--renderer", "point", "--trajectory", path, "--out", self.dir / "f.csv")
+        squares = []
+        with open(self.dir / "f.csv") as file:
+            for tip, row in zip(tips, csv.DictReader(file)):
+                force = [float(row["force_" + axis]) for axis in "xyz"]
+                far = math.hypot(*tip)
+                exact = [stiffness * max(0, radius - far) * x / far for x in tip]
+                if any(force) or any(exact):
+                    squares.append(sum((a - b) ** 2 for a, b in zip(force, exact)))
+        rms = math.sqrt(sum(squares) / len(squares))
+        self.assertGreater(rms, 1e-3)
+        self.assertAlmostEqual(law["force_error_rms_n"] / rms, 1, delta=0.1)
+
+    def test_poses_that_no_hand_has_are_refused(self):
+        scene = self.file("cube.json", CUBE)
+        for last in ("nan", "1e308"):
+            path = self.file("p.csv", f"t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n0,0,0,1,0,0,2\n0.001,0,0,1,0,0,{last}\n")
+            done = self.palpate("accuracy", scene, "--trajectory", path, status=2)
+            self.assertIn("p.csv: line 3: expected tip and tail within 1e6 m", done.stderr)
+
+    def test_a_path_that_stays_inside_leaves_nothing_to_choose(self):
+        path = self.file("p.csv", "t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z\n" + "".join(
+            f"{i / 1000},0,0,{i * 1e-6},0,0,{0.01 + i * 1e-6}\n" for i in range(50)))
+        result, _ = self.study(self.file("cube.json", CUBE), "--trajectory", path)
+        self.assertEqual(result["choose"], "Nothing to choose: nothing is touched on this path.")
 
     def test_what_moves_or_gives_is_held_against_finer_steps(self):
         loose = {"objects": [{"shape": "cube", "edge_m": 0.05, "body": {"mass_kg": 1, "damping_per_s": 20}}]}
