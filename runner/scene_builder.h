@@ -24,7 +24,7 @@ namespace palpate::runner {
 
 const rendering::Renderer& renderer_for(protocols::RendererKind kind);
 
-/// What objects have to feel beside their surface.
+/// The fields and knocks of objects.
 std::vector<rendering::ObjectEffects> effects_of(const std::vector<stimuli::ObjectSpec>& objects);
 
 rendering::Tool tool_of(const protocols::ToolSpec& spec);

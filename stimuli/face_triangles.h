@@ -26,7 +26,7 @@ PolygonPlane plane_of(std::span<const Vec3> corners);
 
 // Triangles without area in a closed surface.
 
-/// What collapse_flat_triangles did.
+/// The results of collapse_flat_triangles.
 struct Flattened {
   std::size_t triangles = 0;  ///< taken out
   std::size_t corners = 0;    ///< merged with a neighbour

@@ -228,7 +228,7 @@ class XmlPart {
            XML_STATUS_OK;
   }
 
-  // What is thrown is kept until expat has returned.
+  // An exception is kept until expat has returned.
   template <class Step>
   static void guarded(void* self, Step step) {
     auto& part = *static_cast<XmlPart*>(self);

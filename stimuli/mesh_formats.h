@@ -1,6 +1,6 @@
 #pragma once
-// What the readers of mesh files share: faults with their location, words, numbers and the error of
-// the numbers.
+// Common parts of the readers of mesh files: faults with their location, words, numbers and the
+// error of the numbers.
 
 #include <cstddef>
 #include <cstdint>

@@ -1,5 +1,5 @@
 #pragma once
-// What a mesh is made of, and what is said of one that cannot be made. SI units.
+// The corners and polygons of a mesh, and the error of one that cannot be made. SI units.
 
 #include <cstdint>
 #include <memory>

@@ -34,7 +34,7 @@ std::string axis_title(const GroupedMeasure& measure) {
   return measure.unit.empty() ? name : name + " (" + printable(measure.unit) + ")";
 }
 
-/// What a panel shows: at each place along x, the series side by side.
+/// The contents of a panel: at each place along x, the series side by side.
 struct DesignPanel {
   const GroupedMeasure& measure;
   std::size_t factor = 0;      ///< within participants; its levels are series, or places

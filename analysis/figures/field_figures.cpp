@@ -34,7 +34,7 @@ const FieldAnalysis::Dimension& other_of(const FieldAnalysis& field) {
   return field.dimensions[place_dimension(field.function)];
 }
 
-/// What the curves are.
+/// The meaning of the curves.
 std::string location_title(const FieldAnalysis& field) {
   if (field.has_jnd()) return with_unit("JND", unit_of_parameter(field, "jnd"));
   if (field.function.form == protocols::FieldForm::cues)

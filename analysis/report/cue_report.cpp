@@ -57,7 +57,7 @@ bool is_below(const CueTest& test) { return test.test.p && *test.test.p < kAlpha
 
 bool is_different(const CueTest& test) { return test.test.p && *test.test.p < kAlpha; }
 
-/// What the group shows, each in a sentence. Agreement with one prediction alone says little
+/// The results of the group, each in a sentence. Agreement with one prediction alone says little
 /// (Scarfe 2022), so none says that people are optimal.
 std::vector<std::string> cue_sentences(const CueAnalysis& analysis) {
   if (analysis.participants.empty()) return {};

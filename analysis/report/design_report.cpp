@@ -235,7 +235,7 @@ std::vector<std::string> weighted_notes(const GroupedMeasure& of, const DesignMo
   return out;
 }
 
-/// What the mixed model is, and what was taken out of it.
+/// The terms of the mixed model, and those that were removed.
 std::vector<std::string> model_notes(const GroupedMeasure& of) {
   const DesignModel& model = *of.model;
   if (model.weighted) return weighted_notes(of, model);

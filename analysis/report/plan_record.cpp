@@ -136,7 +136,7 @@ Json point_json(const ThresholdPower& one) {
           {"n_not_determined", one.undetermined}};
 }
 
-/// What is needed with so many trials, and the curve.
+/// The participants needed with so many trials, and the curve.
 std::pair<Json, Json> curve_json(const ThresholdPlan& plan, std::size_t trials) {
   Json needed{{"trials_per_cell", trials}, {"participants", nullptr}};
   Json curve{{"trials_per_cell", trials}, {"points", Json::array()}};

@@ -126,7 +126,7 @@ Json counts(const Counts& counts) {
           {"accuracy", number(counts.accuracy)}};
 }
 
-/// What the test says for no difference. \param name  of the 90 % interval
+/// The evidence for no difference. \param name  of the 90 % interval
 void put_evidence(Json& out, const std::string& name, const std::optional<double>& mean,
                   const TTest& test) {
   const PairedEvidence found = mean ? evidence_of(*mean, test) : PairedEvidence{};

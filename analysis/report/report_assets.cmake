@@ -1,4 +1,4 @@
-# What a page carries beside its text and figures: style and script.
+# Style and script of a page.
 
 # Text of a file as a C++ function that returns it.
 function(palpate_text_function out name file)

@@ -10,7 +10,7 @@
 namespace palpate::analysis {
 namespace {
 
-/// What an analysis is told as.
+/// The report of an analysis, in each form.
 class StudyReport {
  public:
   explicit StudyReport(const StudyAnalysis& analysis) : analysis_(analysis) {}

@@ -291,7 +291,7 @@ std::vector<Told> differences_of_renderers(const StudyAnalysis& analysis) {
   return all;
 }
 
-/// What differs clearly between renderers, and in what there is no clear difference.
+/// The measures that differ clearly between renderers, and those without a clear difference.
 std::string finding_on_renderers(const StudyAnalysis& analysis) {
   std::vector<std::string> clear, unclear;
   std::size_t more = 0;

@@ -17,7 +17,7 @@ std::string stimulus_of(const std::string& task, const std::string& block,
 /// p < 0.05) or, with one renderer, between rated stimuli; without any comparison the means.
 std::string conclusion(const StudyAnalysis& analysis);
 
-/// What was found: in a study of groups first between them.
+/// The findings: in a study of groups first between them.
 std::string headline(const StudyAnalysis& analysis);
 
 /// How functions were fitted.

@@ -51,7 +51,7 @@ void check(const boost::program_options::variables_map& values,
     throw UsageError("--bootstrap: expected 0, or 100 to 100000 simulated studies");
   for (const char* other : {"sweep", "movement", "cues"}) {
     if (values.count("glmm") && values.count(other))
-      throw UsageError("--glmm: does not go with --" + std::string(other));
+      throw UsageError("--glmm: cannot be combined with --" + std::string(other));
   }
   if (values.count("pattern") && !values.count("sweep"))
     throw UsageError("--pattern: is looked for in a sweep; give --sweep FILE");
@@ -143,9 +143,9 @@ void check_movement(const boost::program_options::variables_map& values, double 
   }
   if (!values.count("db"))
     throw UsageError("--movement: needs the samples of a database; give --db FILE");
-  if (values.count("scale")) throw UsageError("--scale: does not go with --movement");
+  if (values.count("scale")) throw UsageError("--scale: cannot be combined with --movement");
   if (!values["function"].defaulted() || !values["too-fast-s"].defaulted())
-    throw UsageError("--function, --too-fast-s: do not go with --movement");
+    throw UsageError("--function, --too-fast-s: cannot be combined with --movement");
   if (!(cutoff > 0) || !std::isfinite(cutoff))
     throw UsageError("--cutoff-hz: expected a frequency in Hz above 0");
   if (jobs < 1 || jobs > 1024) throw UsageError("--jobs: must be 1 to 1024");
@@ -297,7 +297,7 @@ int analyze_command(const std::vector<std::string>& args) {
       if (values->count(option)) throw UsageError("--cues: not with --" + std::string(option));
     }
     if (!(*values)["function"].defaulted() || !(*values)["too-fast-s"].defaulted())
-      throw UsageError("--function, --too-fast-s: do not go with --cues");
+      throw UsageError("--function, --too-fast-s: cannot be combined with --cues");
     std::vector<analysis::ProtocolText> protocols = protocols_in(design);
     study::Study study = study::read_study({database, csv, protocol, protocols}, true);
     if (!csv.empty()) study.record.protocols = std::move(protocols);

@@ -30,7 +30,7 @@ void list_exports(const data::ParticipantSummary& holdings, const std::string& d
   }
 }
 
-/// What the database and its exports hold of the participant.
+/// The participant's data in the database and its exports.
 void print(const data::ParticipantSummary& holdings, const std::string& code,
            const std::string& database) {
   if (holdings.protocols > 0) {

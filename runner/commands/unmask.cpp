@@ -57,8 +57,8 @@ int unmask_command(const std::vector<std::string>& args) {
   line.usage = "palpate unmask --db FILE [--by NAME]";
   line.summary =
       "Says which letter stands for which group of a study with masked groups. From then on\n"
-      "the session's console, exports and analyses of this database have the names. When and\n"
-      "by whom it was done stays in the database, and check tells it.";
+      "the session's console, exports and analyses of this database have the names. The date\n"
+      "and the name of the person stay in the database, and 'palpate check' reports them.";
   line.example =
       "  palpate unmask --db study.db             by the name of your login\n"
       "  palpate unmask --db study.db --by 'M. Curie'";

@@ -1,6 +1,6 @@
 #pragma once
-// What the page of palpate design asks of a text: pure functions of the text and of the meshes in
-// its folder.
+// Answers to the page of palpate design about a text: pure functions of the text and of the meshes
+// in its folder.
 
 #include <nlohmann/json.hpp>
 #include <string>
@@ -28,8 +28,8 @@ class BuiltShapes {
 nlohmann::ordered_json check_answer(const std::string& text, const std::string& path,
                                     BuiltShapes& shapes);
 
-/// What 'palpate schedule --recover' finds of the procedures of a block: {"procedures": [...]}.
-/// \throws as parse_protocol_text; UsageError: they find no threshold
+/// The results of 'palpate schedule --recover' for the procedures of a block: {"procedures":
+/// [...]}. \throws as parse_protocol_text; UsageError: they find no threshold
 nlohmann::ordered_json recover_answer(const std::string& text, const std::string& path,
                                       const std::string& block, int participants);
 

@@ -1,4 +1,4 @@
-# What the page of palpate design is made of, embedded: its own files, the schemas, and protocols to begin with.
+# Embedded parts of the page of palpate design: its own files, the schemas, and protocols to begin with.
 
 # palpate_embed_table(OUT FUNCTION FILE...): appends a function that returns these files' names and texts to a text.
 function(palpate_embed_table out function)

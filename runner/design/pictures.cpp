@@ -101,7 +101,7 @@ class Surfaces {
   }
 
  private:
-  /// What decides on a surface.
+  /// The keys that decide on a surface.
   static Json shape_of(const stimuli::ObjectSpec& object) {
     Json out{static_cast<int>(object.shape),
              object.radius,
@@ -126,7 +126,7 @@ class Surfaces {
   std::map<std::string, touch::PictureMesh> surfaces_;
 };
 
-/// What is seen, if it looks other than what is felt; null: it does not.
+/// The seen object, if it differs from the felt one; null: it does not.
 Json seen_of(const StimulusSpec& stimulus, Surfaces& surfaces) {
   if (!stimulus.seen || !stimulus.seen->object) return nullptr;
   const protocols::SeenSpec& seen = *stimulus.seen;
@@ -245,7 +245,7 @@ class Pictures {
     }
   }
 
-  /// What is varied stands with the first picture of a name.
+  /// The varied numbers stand with the first picture of a name.
   Json all() {
     for (Json& picture : pictures_) {
       const auto varied = varied_.find(picture["name"].get<std::string>());

@@ -18,7 +18,7 @@ class NotSaved : public std::runtime_error {
  public:
   explicit NotSaved(const std::string& why, std::optional<FileState> found = std::nullopt)
       : std::runtime_error(why), found_(std::move(found)) {}
-  /// What another program has written there meanwhile, if that is the reason.
+  /// The text that another program has written there meanwhile, if that is the reason.
   const std::optional<FileState>& found() const { return found_; }
 
  private:

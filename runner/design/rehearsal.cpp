@@ -70,7 +70,8 @@ std::string report_of(data::Store& store) {
   return analysis::study_html(found, study.record);
 }
 
-/// What a palpate of this computer does with a person and a device now: "run", "serve", "explore";
+/// The present activity of a palpate of this computer with a person and a device: "run", "serve",
+/// "explore";
 /// "": nothing.
 std::string session_on_this_computer() {
   std::error_code error;

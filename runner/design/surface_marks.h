@@ -1,5 +1,5 @@
 #pragma once
-// What a picture draws on a textured surface: the crests of ridges as lines, and where a texture
+// Marks on a textured surface in a picture: the crests of ridges as lines, and where a texture
 // has no ridges, dots on its crests. The object's frame, m.
 
 #include <array>

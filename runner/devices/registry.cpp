@@ -203,7 +203,7 @@ std::optional<std::string> read_all(int from, std::chrono::seconds patience) {
   }
 }
 
-/// What `work` returns in a separate process, which a maker's library can crash or hold up.
+/// The result of `work` in a separate process, which a maker's library can crash or hold up.
 /// \param what  "listing these devices". \throws std::runtime_error
 Json in_child(const std::function<Json()>& work, std::chrono::seconds patience,
               const std::string& what) {

@@ -1,5 +1,5 @@
 #pragma once
-// What the participant sees of a stimulus beside touch: the drawn scene at a moment, as plain
+// The view of a stimulus beside touch: the drawn scene at a moment, as plain
 // values. Virtual frame, m, unless noted.
 
 #include <cstddef>
@@ -34,7 +34,7 @@ struct SeenTrial {
 /// between both
 PictureWindow window_of(const SeenTrial& trial, double right = 0);
 
-/// What a frame needs of a tick.
+/// The part of a tick that a frame needs.
 struct SeenMoment {
   std::int64_t time_ns = 0;  ///< session clock
   rendering::LineProbe hand, ideal;

@@ -1,5 +1,5 @@
 #pragma once
-// What one tick costs: its time by a fast clock, and its heap allocations.
+// Cost of one tick: its time by a fast clock, and its heap allocations.
 
 #include <chrono>
 #include <cstdint>

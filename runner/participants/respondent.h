@@ -89,7 +89,7 @@ class Respondent {
                                          const Asking& /*how*/) {
     return "";
   }
-  /// What was drawn of the trial that ends; empty: nothing was seen.
+  /// The frames drawn in the trial that ends; empty: nothing was seen.
   virtual std::vector<data::FrameRecord> frames() { return {}; }
   /// A trial is on record: of this run, or of an earlier one that the session resumes.
   virtual void learn_from(const data::TrialRecord& /*record*/) {}

@@ -1,5 +1,5 @@
 #pragma once
-// What is kept of the frames in which a trial was seen.
+// Record of the frames in which a trial was seen.
 
 #include <optional>
 #include <vector>

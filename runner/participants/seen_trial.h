@@ -1,5 +1,5 @@
 #pragma once
-// What the participant sees of an interval, from the protocol.
+// The view of an interval, from the protocol.
 
 #include <memory>
 

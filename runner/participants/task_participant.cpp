@@ -276,7 +276,7 @@ double TaskJudgement::noise_of_difference(double reference) const {
   return settings_.weber * std::max(std::abs(levels.front()), std::abs(levels.back()));
 }
 
-/// What is seen of an interval.
+/// The view of an interval.
 struct TaskJudgement::Sight {
   bool felt = true;                            ///< the stimulus gives force
   std::optional<double> level = std::nullopt;  ///< none: nothing is seen of it

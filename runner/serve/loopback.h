@@ -1,5 +1,5 @@
 #pragma once
-// What servers of pages on this computer have in common: they listen on 127.0.0.1 alone, and no
+// Common part of servers of pages on this computer: they listen on 127.0.0.1 alone, and no
 // page of another origin reaches them.
 
 #include <boost/asio/ip/tcp.hpp>

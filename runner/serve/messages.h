@@ -61,7 +61,7 @@ enum class MessageType {
 /// Fields that may follow time and tick in a row of a stream.
 enum class StreamField { tip, tail, force, rendered, contact, depth, object, faults, lateness };
 
-/// What a program wants to be felt in a trial or in one of its intervals.
+/// The object that a program wants to be felt in a trial or in one of its intervals.
 struct Wanted {
   std::string stimulus, renderer;  ///< empty: not given
   std::optional<double> level;
@@ -132,7 +132,7 @@ std::string accepted(std::int64_t id,
 /// The same for a refusal: {"re":id,"ok":false,"error":{...},...}
 std::string refused(const std::optional<std::int64_t>& id, const std::vector<Refusal>& why,
                     const nlohmann::ordered_json& more = nlohmann::ordered_json::object());
-/// What a mark or a note says: {"code":...,"text":...}, the code of a mark alone.
+/// The contents of a mark or a note: {"code":...,"text":...}, the code of a mark alone.
 nlohmann::ordered_json remark(const Message& message);
 /// {"event":name,"t_ns":t,...}
 std::string event(const std::string& name, std::int64_t t_ns,

@@ -1,5 +1,5 @@
 #pragma once
-// What fields ask of a device, so that the sampled loop of hand, device and fields is passive.
+// Demand of fields on a device, so that the sampled loop of hand, device and fields is passive.
 
 #include <vector>
 

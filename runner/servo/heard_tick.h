@@ -1,5 +1,5 @@
 #pragma once
-// What a tick with forces gives to the ear, and the queue that carries it to the sound's thread.
+// The audible part of a tick with forces, and the queue that carries it to the sound's thread.
 
 #include <algorithm>
 #include <cstdint>

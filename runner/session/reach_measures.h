@@ -13,8 +13,8 @@
 
 namespace palpate::runner::session {
 
-/// s; speeds are differences of places so far apart: devices resolve some 30 um, of which a single
-/// tick would make 30 mm/s.
+/// s, between the two places of a speed. Over a single tick the 30 um that devices resolve would
+/// read as 30 mm/s.
 inline constexpr double kSpeedSpan = 0.02;
 
 /// Whether the tip rests in the target: slower than ReachingSpec::kStopSpeed over the last

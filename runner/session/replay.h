@@ -87,7 +87,7 @@ std::vector<std::optional<stimuli::ObjectSpec>> shown_objects(const protocols::P
 /// Whether the stimulus of an interval gives forces.
 bool is_felt(const protocols::Protocol& protocol, const data::IntervalRecord& recorded);
 
-/// What was seen in each interval; null: nothing.
+/// The view of each interval; null: nothing was seen.
 /// \throws std::invalid_argument where protocol and record do not agree
 std::vector<std::shared_ptr<const display::SeenTrial>> shown_sights(
     const protocols::Protocol& protocol, const data::TrialRecord& recorded);

@@ -43,7 +43,7 @@ class Session {
   /// Of the interval under way.
   const FieldPower& field_power() const { return power_; }
   const protocols::SessionPlan& plan() const { return station_.plan; }
-  /// What a trial asks.
+  /// The task of a trial.
   const protocols::TaskBlock& task_of(const protocols::Trial& trial) const;
   /// Whether a page after the last trial still needs answers.
   bool has_open_pages() const;

@@ -1,5 +1,5 @@
 #pragma once
-// What ends a session, or a trial of it, before its time.
+// Early ends of a session or of a trial.
 
 #include <cstdint>
 #include <stdexcept>

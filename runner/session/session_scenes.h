@@ -40,7 +40,7 @@ class SessionScenes {
   std::map<Shown, std::unique_ptr<const StimulusLibrary>> known_;  ///< only the newest are kept
 };
 
-/// What is heard of its contacts, at the interval's level; none: nothing.
+/// The sound of its contacts, at the interval's level; none: silence.
 std::optional<protocols::SoundSpec> contact_sound(const protocols::Protocol& protocol,
                                                   const protocols::Trial& trial,
                                                   const protocols::Interval& interval);

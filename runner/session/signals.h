@@ -1,5 +1,5 @@
 #pragma once
-// What a session sends beside forces and words: sound to the participant's
+// Signals of a session beside forces and words: sound to the participant's
 // headphones, markers to other recorders. Belongs to the session's thread.
 
 #include <cstdint>

@@ -325,7 +325,7 @@ class Recorder {
   std::map<std::size_t, data::Run> runs_;
 };
 
-/// What simulated participants of each group do.
+/// The behaviour of simulated participants of each group.
 class SimulatedGroups {
  public:
   /// \param protocol, settings  must outlive it. \throws as SimulatedStudy

@@ -51,7 +51,7 @@ AdvisorJson json_of(const data::TrialRecord& record) {
   return out;
 }
 
-/// What a dimension's range is called in messages.
+/// The key of a dimension's range in messages.
 std::string range_text(const protocols::LevelDimension& dimension,
                        const protocols::DimensionRange& range) {
   return "'" + dimension.name + "' from " + protocols::level_text(range.min) + " to " +
@@ -112,7 +112,7 @@ int open_socket(const std::string& path, std::string& trouble) {
   return -1;
 }
 
-/// What may be answered about a trial.
+/// The permitted answers about a trial.
 AdvisorJson range_json(const protocols::TaskBlock& block, const protocols::Trial& next) {
   AdvisorJson out;
   if (block.dimensions.empty()) {

@@ -31,7 +31,7 @@ class ContactSound {
   /// \param rate  Hz. \param lag  s, from a tick to its sound. \param seed  of scraping
   ContactSound(double rate, double lag, std::uint64_t seed);
 
-  /// From now on contacts sound like this; null: like nothing. What already sounds goes on.
+  /// The sound of contacts from now on; null: silence. Sounds in progress continue.
   void play(std::shared_ptr<const SoundSource> source);
   /// Ticks with forces, in order.
   void hear(const servo::HeardTick& tick);

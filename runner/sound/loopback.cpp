@@ -24,7 +24,7 @@ std::int64_t now_ns() {
       .count();
 }
 
-/// What was heard, and when.
+/// The recorded sound, and its time.
 class Heard {
  public:
   explicit Heard(SoundInput& input)

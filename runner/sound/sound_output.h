@@ -14,7 +14,7 @@ class SoundError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// What is asked of an output; it takes the nearest that it can.
+/// Requested settings of an output; it takes the nearest that it can.
 struct SoundBuffer {
   unsigned block = 64;  ///< frames that are written at a time
   unsigned blocks = 2;  ///< that it holds

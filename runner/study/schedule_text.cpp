@@ -36,7 +36,7 @@ bool has_reaches(const protocols::Protocol& protocol) {
   return std::ranges::any_of(protocol.blocks, [](const auto& b) { return b.reaching.has_value(); });
 }
 
-/// What the table shows as the level: of a reach, the target and what is felt on the way.
+/// The level as the table shows it: of a reach, the target and the field on the way.
 std::string shown_level(const ListedTrial& row) {
   if (row.kind.empty()) return row.trial.catch_trial ? "catch" : row.level;
   return row.level + (row.trial.reach == protocols::ReachTrial::field ? "" : " " + row.kind);

@@ -31,7 +31,7 @@ std::string size_in_mm(const Vec3& size_m) {
   return text;
 }
 
-/// What a size says of the unit; empty: nothing.
+/// A note on the unit of a size; empty: none.
 std::string unit_advice(const Vec3& size_m, const std::string& file_name) {
   const double largest = 1000 * std::max({size_m.x, size_m.y, size_m.z});
   if (largest > kBeyondHands) {
@@ -89,7 +89,7 @@ std::optional<std::string> elements_felt(const rendering::SoftObject& object) {
   std::snprintf(text, sizeof text,
                 "the nodes of its elements are %.1f mm apart and the tool has a radius of %.1f mm: "
                 "a sliding tool feels each node; expected a tool/radius_m of the "
-                "spacing or more, or a higher soft/resolution",
+                "spacing or more, or smaller elements (soft/resolution, or those of the file)",
                 1000 * spacing, 1000 * radius);
   return text;
 }

@@ -68,8 +68,8 @@ class LayerField {
         farthest = std::max(farthest, glm::distance(corner, nearest));
       return std::min(plain, farthest - depth_);
     }
-    // What is no layer is made of balls of radius `depth`: one that holds no corner goes through a
-    // face of the cube as far as its cap.
+    // The solid above the layer is a union of balls of radius `depth`: one without a corner goes
+    // through a face of the cube as far as its cap.
     if (within_ != nullptr && centre.own + beyond_ < radius) return plain;
     const double half2 = 0.5 * width * width;
     return half2 < depth_ * depth_ ? std::min(plain, depth_ - std::sqrt(depth_ * depth_ - half2))

@@ -1,5 +1,5 @@
 #pragma once
-// What a primitive or the groups of a mesh file give as convex parts.
+// The convex parts of a primitive or of the groups of a mesh file.
 
 #include <optional>
 #include <string>

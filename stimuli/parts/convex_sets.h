@@ -28,7 +28,7 @@ struct ConvexSet {
 
 ConvexSet whole(const MeshPointer& part);
 
-/// What limits the growth of a set.
+/// The limits of a set's growth.
 struct Kept {
   std::optional<HalfSpace> plane = std::nullopt;  ///< it must not grow through this
   std::optional<Vec3> point = std::nullopt;       ///< m, to keep; nullopt: only grow

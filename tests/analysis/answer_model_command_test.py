@@ -128,7 +128,7 @@ class AnswerModel(unittest.TestCase):
 
     def test_options_that_do_not_fit(self):
         for options, words in ((("--bootstrap", "200"), "give --glmm"), (("--glmm", "--bootstrap", "20"), "100 to 100000"),
-                               (("--glmm", "--cues"), "does not go with --cues")):
+                               (("--glmm", "--cues"), "cannot be combined with --cues")):
             done = self.analyzed(rows_of(STUDIES[0]), *options)
             self.assertEqual(done.returncode, 2)
             self.assertIn(words, done.stderr)

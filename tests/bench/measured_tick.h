@@ -4,7 +4,8 @@
 
 namespace palpate::bench {
 
-/// What callgrind counts in. In a file of its own, where the compiler cannot know the renderer.
+/// The functions in which callgrind counts. In a file of its own, where the compiler cannot know
+/// the renderer.
 double measured_tick(const rendering::Renderer& renderer, const rendering::Scene& scene,
                      rendering::RenderState& state, const rendering::LineProbe& probe);
 

@@ -1,4 +1,4 @@
-// What the pump of Haply's driver adds to a bare loop: round trips of one message at a time to an
+// Cost of the pump of Haply's driver beside a bare loop: round trips of one message at a time to an
 // emulated service, and the delay from a pose to its force of the driver at 1 kHz, in alternating
 // runs, on an idle machine and with every processor busy.
 //

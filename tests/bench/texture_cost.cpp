@@ -1,4 +1,4 @@
-// What a texture or a field adds to a tick, beside the bare tick over the same path: a stylus that
+// Cost of a texture or a field in a tick, beside the bare tick over the same path: a stylus that
 // slides over the face of a box, always in contact.
 //
 // Each tick is timed by itself in some rounds, the cases by turns, and has its least time: other

@@ -103,7 +103,7 @@ void expect_bounds(const char* key, const json& good, const json& schema,
   }
 }
 
-TEST(ParseEffects, BoundsAreThoseOfTheSchema) {
+TEST(ParseEffects, BoundsEqualSchema) {
   std::ifstream stream(PALPATE_SOURCE_DIR "/protocols/scene.schema.json");
   const json all = json::parse(stream)["$defs"];
   const json sine = {{"kind", "sine"}, {"period_m", 0.002}, {"depth_m", 0.0001}};

@@ -804,7 +804,7 @@ TEST_P(SurfaceContact, LoneSurfaceGivesTheBitsOfAnyScene) {
 }
 
 /// A hand that has come from outside in one tick is held where one is that came in small steps.
-TEST_P(SurfaceContact, AFirstContactIsThatOfSmallSteps) {
+TEST_P(SurfaceContact, FirstContactEqualsSmallSteps) {
   constexpr int kApproaches = 300, kSteps = 32;
   constexpr std::uint64_t kSeed = 17;
   Random random(kSeed);

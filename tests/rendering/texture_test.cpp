@@ -121,7 +121,7 @@ TEST(TexturedContact, FlankPushesAlongItsNormal) {
   }
 }
 
-TEST(TexturedContact, MeanForceIsThatOfTheMeanHeight) {
+TEST(TexturedContact, MeanForceEqualsMeanHeight) {
   const stimuli::TextureSpec spec = sine(0.002, 0.00001);
   Plate felt(spec);
   double sum = 0;

@@ -125,7 +125,7 @@ TEST(LayerSurface, PartsThatAbutHaveNoSurfaceBetween) {
   EXPECT_NEAR(volume_within(layer_surface(solid, 0.005).surface), 0.04 * 0.01 * 0.01, 1e-14);
 }
 
-TEST(LayerSurface, OfAPartEndsWhereThePartDoes) {
+TEST(LayerSurface, EndsWithItsPart) {
   const ClosedSurface left = closed_box({0, 0, 0}, {0.02, 0.02, 0.02}),
                       right = closed_box({0.02, 0, 0}, {0.05, 0.02, 0.02});
   const std::vector<PlacedShell> shells = {{&left, Pose{}}, {&right, Pose{}}};

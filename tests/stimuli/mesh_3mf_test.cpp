@@ -239,7 +239,7 @@ TEST(Mesh3mf, FaultsNameFileLineAndWhatWasExpected) {
             "a.3mf: 3D/3dmodel.model: line 1: expected no document type, found \"DOCTYPE\"");
   EXPECT_EQ(fault_in(""),
             "a.3mf: 3D/3dmodel.model: line 1: expected XML, found \"no element found\"");
-  // What is not closed is named by the object and its own numbers.
+  // An open mesh is named by the object and its own numbers.
   std::string open = good;
   const std::size_t last = open.rfind("<triangle ");
   open.erase(last, open.find("/>", last) + 2 - last);
@@ -253,7 +253,7 @@ TEST(Mesh3mf, FaultsNameFileLineAndWhatWasExpected) {
   }
 }
 
-TEST(Mesh3mf, WhatIsNoPackageIsRefused) {
+TEST(Mesh3mf, RefusesOtherArchives) {
   EXPECT_EQ(fault_of(""), "a.3mf: expected a ZIP archive, found an empty file");
   EXPECT_EQ(fault_of("solid cube"),
             "a.3mf: expected a ZIP archive, found another file, or one cut off");

@@ -126,7 +126,7 @@ inline void expect_convex_mesh(const ConvexMesh& mesh, double stands_out) {
   ASSERT_GE(farthest, mesh.radius() * (1 - 1e-12));
 }
 
-/// What closed_surface.h guarantees for every surface.
+/// The guarantees of closed_surface.h for every surface.
 inline void expect_closed(const ClosedSurface& surface) {
   std::vector<char> used(surface.vertices.size(), 0);
   ASSERT_EQ(surface.across.size(), surface.triangles.size());

@@ -61,7 +61,7 @@ TEST(Texture, SineHasCrestsAtItsOrigin) {
   EXPECT_DOUBLE_EQ(texture.cycles({0.003, 5, 7}), 1.5);
 }
 
-TEST(Texture, DerivativesAreThoseOfTheHeight) {
+TEST(Texture, DerivativesEqualDifferencesOfHeight) {
   Random random(5);
   constexpr double kStep = 1e-7;  // m
   for (const Texture& texture : textures()) {

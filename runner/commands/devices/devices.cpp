@@ -440,7 +440,8 @@ int devices_command(const std::vector<std::string>& args) {
     for (const char* other : {"device", "timing", "calibrate", "json"}) {
       if (values->count(other) > 0)
         throw UsageError(
-            std::string("--markers sends markers and does nothing else; it does not go with --") +
+            std::string(
+                "--markers sends markers and does nothing else; it cannot be combined with --") +
             other);
     }
     return try_markers((*values)["markers"].as<std::vector<std::string>>());
@@ -471,7 +472,8 @@ int devices_command(const std::vector<std::string>& args) {
     for (const char* other : {"device", "timing", "calibrate", "report"}) {
       if (values->count(other) > 0)
         throw UsageError(
-            std::string("--sound measures sound and nothing else; it does not go with --") + other);
+            std::string("--sound measures sound and nothing else; it cannot be combined with --") +
+            other);
     }
     status = measure_sound((*values)["sound"].as<std::string>(),
                            (*values)["loopback"].as<std::string>(), config.calibration, report);

@@ -1,5 +1,5 @@
 #pragma once
-// What the devices command calls for --calibrate, --sound and --report.
+// The parts of the devices command: --calibrate, --sound and --report.
 
 #include <boost/program_options.hpp>
 #include <nlohmann/json.hpp>

@@ -373,7 +373,7 @@ int draw_pictures(const po::variables_map& values, const rendering::Renderer& re
   for (const char* option : {"device", "pictures"})
     if (values.count(option) > 0)
       throw UsageError("--" + std::string(option) +
-                       " goes with the window: leave out --frames and --animation");
+                       " requires the window: leave out --frames and --animation");
   output::Outputs outputs(values, {"animation"}, {"SCENE.json", "trajectory"});
   const std::string animation =
       values.count("animation") > 0 ? text_of(values, "animation") : std::string();
@@ -445,7 +445,7 @@ int explore_command(const std::vector<std::string>& args) {
   for (const char* option : {"size", "every", "view"})
     if (!(*values)[option].defaulted())
       throw UsageError("--" + std::string(option) +
-                       " goes with pictures: expected --frames or --animation");
+                       " requires pictures: expected --frames or --animation");
   return open_window(*values, renderer, device);
 }
 

@@ -309,7 +309,7 @@ analysis::ThresholdStudy study_of(const ThresholdOptions& thresholds, const Meas
   for (const char* const option : {"movement-sd", "contrast"}) {
     if (!reaching && values.count(option) != 0 && !values[option].defaulted())
       throw UsageError(std::string("--") + option +
-                       ": goes with --deviation-effect, --aftereffect-effect and "
+                       ": requires --deviation-effect, --aftereffect-effect and "
                        "--adaptation-effect");
   }
   study.pse_sd = thresholds.pse_sd;
@@ -668,8 +668,7 @@ int plan_command(const std::vector<std::string>& args) {
     return 0;
   }
   for (const char* const option : {"effect-between", "effect-interaction"}) {
-    if (values->count(option))
-      throw UsageError(std::string("--") + option + ": goes with --groups");
+    if (values->count(option)) throw UsageError(std::string("--") + option + ": requires --groups");
   }
   for (const MeasureOption& one : kMeasureOptions) {
     if (values->count(one.name) == 0) continue;

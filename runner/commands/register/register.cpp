@@ -153,7 +153,7 @@ hypotheses.json:
   if (!options.groups.empty() && values->count("participants"))
     throw UsageError("--groups: says how many participants; leave out --participants");
   if (!options.groups.empty() && !looks.empty())
-    throw UsageError("--looks: go with groups of one size; leave out --groups");
+    throw UsageError("--looks: require groups of one size; leave out --groups");
   if (!(options.too_fast > 0 && options.too_fast <= registration::kMostTooFast))
     throw UsageError("--too-fast-s: must be above 0, at most 60 s");
   if (values->count("studies")) options.studies = studies;

@@ -42,7 +42,7 @@ void pad(std::string& line, std::size_t column) {
   line.append(line.size() < column ? column - line.size() : 1, ' ');
 }
 
-/// What its features cost, and what those that it does not need would.
+/// The cost of each feature of the scene, and the cost that absent features save.
 std::string features_text(const Explanation& e) {
   std::string out;
   const auto put = [&out](const std::string& name, const std::string& number,
@@ -219,7 +219,7 @@ int render_command(const std::vector<std::string>& args) {
   if (explains &&
       (values->count("trajectory") > 0 || values->count("out") > 0 || values->count("bodies") > 0))
     throw UsageError("--explain renders nothing: leave out --trajectory, --out and --bodies");
-  if (!explains && values->count("json") > 0) throw UsageError("--json goes with --explain");
+  if (!explains && values->count("json") > 0) throw UsageError("--json requires --explain");
   const std::string scene_path = (*values)["scene"].as<std::string>();
   output::Outputs outputs(*values, {"out", "bodies", "json"}, {"scene", "trajectory"});
   if (explains) {

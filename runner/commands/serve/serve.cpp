@@ -382,11 +382,11 @@ int serve(const po::variables_map& values, station::RunSettings run) {
   }
   for (const char* const option : {"number", "group", "session", "consent"}) {
     if (values.count(option) > 0 && !recorded)
-      throw UsageError(std::string("--") + option + ": goes with --protocol");
+      throw UsageError(std::string("--") + option + ": requires --protocol");
   }
   for (const char* const option : {"sound-device", "without-noise"}) {
     if (!recorded && !values[option].defaulted())
-      throw UsageError(std::string("--") + option + ": goes with --protocol, which has the sounds");
+      throw UsageError(std::string("--") + option + ": requires --protocol, which has the sounds");
   }
   if (!recorded) return serve_scene(values, run);
   if (values.count("scene") > 0 || !values["rate"].defaulted())
@@ -400,7 +400,7 @@ int serve(const po::variables_map& values, station::RunSettings run) {
   run.new_participant = values["new-participant"].as<bool>();
   run.group = text_of(values, "group");
   run.fill = values["fill"].as<bool>();
-  if (run.fill && !recorded) throw UsageError("--fill: goes with --protocol");
+  if (run.fill && !recorded) throw UsageError("--fill: requires --protocol");
   run.no_window = true;
   return serve_session(run, values);
 }

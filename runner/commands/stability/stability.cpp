@@ -29,7 +29,7 @@ namespace {
 
 namespace po = boost::program_options;
 
-/// What is known of a device: its nominal damping, and its delay where that was measured.
+/// The known properties of a device: its nominal damping, and its delay where that was measured.
 evidence::BuzzingDevice device_of(const po::variables_map& values) {
   const std::string name = values["device"].as<std::string>();
   const std::string calibration = text_of(values, "calibration");
@@ -147,16 +147,16 @@ int stability_command(const std::vector<std::string>& args) {
   if (values->count("scene")) {
     for (const char* const other : {"full", "soft", "seed", "effects"}) {
       if (values->count(other) > 0)
-        throw UsageError(std::string("--") + other + ": does not go with a scene");
+        throw UsageError(std::string("--") + other + ": cannot be combined with a scene");
     }
     if (values->count("calibration") > 0 && values->count("device") == 0)
-      throw UsageError("--calibration: goes with --device");
+      throw UsageError("--calibration: requires --device");
     study_users_scene(*values, outputs, jobs);
     return 0;
   }
   for (const char* const other : {"device", "calibration"}) {
     if (values->count(other) > 0)
-      throw UsageError(std::string("--") + other + ": goes with a scene");
+      throw UsageError(std::string("--") + other + ": requires a scene");
   }
   std::optional<output::ProgressLine> progress("loops");
   const evidence::StudyJobs work{jobs, [&](double share) { progress->show(share); },

@@ -1,4 +1,4 @@
-# What pages carry, embedded: style and script of the page of a trial, and the watchers' page of palpate serve. Both draw
+# Embedded parts of pages: style and script of the page of a trial, and the watchers' page of palpate serve. Both draw
 # with drawing.js.
 
 # palpate_embed(NAME HEADER FUNCTION TEXT...): functions that return these texts, in NAME.cpp of the build.

@@ -111,8 +111,8 @@ std::string change_of(const Json& transform, bool shifts) {
   return "";
 }
 
-/// What changes an arm's positions (workspace, basis, mount) or what the hand feels of forces
-/// (damping, N s/m); empty: nothing.
+/// The settings that change an arm's positions (workspace, basis, mount) or what the hand feels of
+/// forces (damping, N s/m); empty: nothing.
 std::string change_of_arm(const Json& arm) {
   if (const Json* const state = member(arm, "state")) {
     if (const Json* const workspace = member(*state, "transform")) {
@@ -189,7 +189,7 @@ Inventory inventory_of(Link& link) {
   return parse_inventory(message);
 }
 
-/// What the service tells of the arm after a message; none: nothing of its configuration.
+/// The arm's configuration in a message of the service; none: the message has nothing of it.
 std::optional<Listed> asked(Link& link, const std::string& message, const std::string& arm) {
   link.send(message);
   std::string_view reply;

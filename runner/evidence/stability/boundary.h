@@ -55,7 +55,7 @@ enum class ContactCase {
 inline constexpr ContactCase kContactCases[] = {ContactCase::wall, ContactCase::edge,
                                                 ContactCase::sphere, ContactCase::two_objects,
                                                 ContactCase::body};
-/// What is felt by one ideal tool at several places.
+/// The objects felt by one ideal tool at several places.
 inline constexpr ContactCase kConcaveCases[] = {ContactCase::groove, ContactCase::concave_edge,
                                                 ContactCase::tool};
 const char* to_string(ContactCase contact_case);

@@ -1,5 +1,5 @@
 #pragma once
-// What every figure must have, whatever it shows.
+// Required parts of every figure.
 
 #include <gtest/gtest.h>
 

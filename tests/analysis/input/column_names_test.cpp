@@ -22,7 +22,7 @@ TEST(ColumnNames, CaseSpacesAndSlipsAreAlike) {
   EXPECT_EQ(meant_by(std::string(65, 'l')), "");
 }
 
-TEST(ColumnNames, WhatIsThereIsNotMeant) {
+TEST(ColumnNames, KeepsExistingNames) {
   EXPECT_TRUE(alike_columns({"level", "Level"}, kNames).empty());
   EXPECT_TRUE(alike_columns({"task", "level"}, kNames).empty());
   const auto both = alike_columns({"Level", "x", "Task"}, kNames);

@@ -196,7 +196,7 @@ TEST(Contacts, StopsAreSlowForLongEnough) {
   EXPECT_TRUE(stops(std::vector<bool>(300, false), speed, 1000).empty());
 }
 
-TEST(Contacts, ProceduresAreToldBySpeedForceAndEdge) {
+TEST(Contacts, ClassifiesProceduresBySpeedForceAndEdge) {
   const auto window = [](double speed, double least, double most, bool edge) {
     std::vector<ContactMotion> ticks(100, {speed, least, edge});
     ticks[50].normal_force = most;

@@ -1,4 +1,4 @@
-// What every report must have, whatever its numbers: names for all of them, and no empty text.
+// Required parts of every report: names for all of them, and no empty text.
 
 #include <gtest/gtest.h>
 

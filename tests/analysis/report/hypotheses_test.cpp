@@ -68,7 +68,7 @@ TEST(Hypotheses, VerdictsFollowTheirConditions) {
             Verdict::corroborated);
 }
 
-TEST(Hypotheses, NumbersThatWereUsedAreTold) {
+TEST(Hypotheses, ReportsNumbersUsed) {
   const Judgement judgement =
       judge({"H1", "", "paired.cone.p_holm < alpha", "paired.cone.p_holm > 0.5 || none.such > 1"},
             named_results(kAnalysis, 0.05));

@@ -180,7 +180,7 @@ std::string note_with(const Table& table, const std::string& part) {
   return {};
 }
 
-TEST(MixedModelTableValues, StandardDeviationsAreThoseOfTheBalancedDesign) {
+TEST(MixedModelTableValues, StandardDeviationsEqualBalancedDesign) {
   for (const std::vector<std::string>& renderers :
        {std::vector<std::string>{"point", "ray"}, {"point", "ray", "tube"}}) {
     const Study study(renderers);

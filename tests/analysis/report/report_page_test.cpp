@@ -1,4 +1,4 @@
-// What the report page shows of a database's record: servo, devices, builds, seeds, protocols.
+// A database's record on the report page: servo, devices, builds, seeds, protocols.
 
 #include <gtest/gtest.h>
 

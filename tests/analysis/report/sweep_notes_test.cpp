@@ -1,4 +1,4 @@
-// What the report of a sweep says below its tables.
+// Notes below the tables of a sweep's report.
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-// What a terminal shows of an analysis of tasks, whole and word for word.
+// The text of an analysis of tasks in a terminal, whole and word for word.
 
 #include <gtest/gtest.h>
 
@@ -78,7 +78,7 @@ TEST(TaskText, AFunctionWithEverything) {
       "1.625 [1.125, 2.125], criterion -0.375 [-0.625, -0.25]");
 }
 
-TEST(TaskText, WhatAFunctionLacksIsLeftOut) {
+TEST(TaskText, LeavesOutMissingParameters) {
   ParticipantFunction one = full_function("Anna");
   one.figures = {};
   one.model.lapse.free = false;

@@ -1,4 +1,4 @@
-// What an analysis warns of, as whole sentences.
+// Warnings of an analysis, as whole sentences.
 
 #include <gtest/gtest.h>
 

@@ -252,7 +252,7 @@ TEST(Cues, SmallerOfTwoLosesPartOfItsBias) {
   }
 }
 
-TEST(Cues, ReportedSlopeIsThatOfOneConflict) {
+TEST(Cues, ReportsSlopeOfOneConflict) {
   Random random(1);
   Person person{.rule = CueModel::free, .weight = 0.7, .sd = 0.06};
   const CueAnswers answers = answers_of(person, 1'000'000, true, random, {0.08});

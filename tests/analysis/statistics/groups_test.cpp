@@ -275,7 +275,7 @@ TEST(BetweenGroups, IntervalsCoverTheTruth) {
 }
 
 /// The test of two groups is a t test of participants' means, whose power has a closed form.
-TEST(GroupPower, IsThatOfNoncentralT) {
+TEST(GroupPower, EqualsNoncentralT) {
   StudyModel model;
   model.shapes = {"cone", "cube"};
   model.log_ratios = {0.1, 0};

@@ -66,7 +66,7 @@ TEST(Pattern, AndBindsTighterThanOr) {
   EXPECT_EQ(holds("(cone > 5 || cube > 5) && sphere > 5"), false);
 }
 
-// What an undefined figure cannot change is known all the same.
+// A pattern is known where an undefined figure cannot change it.
 TEST(Pattern, UndefinedValuesMatterOnlyWhereTheyCount) {
   for (const char* unknown :
        {"none > 5", "!(none > 5)", "none > 5 && cone > 5", "none > 5 || cone < 5", "none == none",

@@ -50,7 +50,7 @@ Analysis analysis_of(const std::vector<Participant>& participants) {
   return analyze(builder.finish({}), {}, "test");
 }
 
-TEST(Learning, SlopesAreThoseOfTheTimesWithinShapes) {
+TEST(Learning, SlopesEqualThoseWithinShapes) {
   const Analysis analysis = analysis_of(
       {{"A", "point", -0.2, -0.3}, {"B", "ray", -0.2, -0.1}, {"C", "point", -0.2, -0.2}});
   const Practice& practice = analysis.practice;

@@ -13,7 +13,7 @@
 namespace palpate::analysis {
 namespace {
 
-TEST(Ratings, SpreadsAndSharesAreThoseOfTheirDefinition) {
+TEST(Ratings, SpreadsAndSharesFollowDefinition) {
   // A: 1 2 2 4; B: 3. In R: quantile(c(1, 2, 2, 4)) is 1, 1.75, 2, 2.5, 4.
   const std::vector<Rating> ratings{
       {0, 2, 7.5}, {1, 3, 7.5}, {0, 4, 7.5}, {0, 1, 9.5}, {0, 2, 9.5}};

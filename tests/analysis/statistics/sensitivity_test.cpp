@@ -74,7 +74,7 @@ Eigen::VectorXd residual(const std::vector<std::vector<double>>& others,
   return y - design * design.colPivHouseholderQr().solve(y);
 }
 
-TEST(RankCorrelations, PartialOnesAreThoseOfTheResiduals) {
+TEST(RankCorrelations, PartialOnesEqualThoseOfResiduals) {
   constexpr std::uint64_t kSeed = 3;
   Random random(kSeed);
   std::vector<std::vector<double>> inputs(4, std::vector<double>(60));

@@ -11,7 +11,7 @@ namespace {
 
 // Two-sided 0.05: the tables of Jennison & Turnbull 2000 and of the package gsDesign for R (sfLDOF,
 // sfLDPocock, 0.025 on either side).
-TEST(SequentialLooks, BoundsAreThoseOfTheTables) {
+TEST(SequentialLooks, BoundsEqualTables) {
   struct Table {
     Spending spending;
     std::vector<std::size_t> participants;

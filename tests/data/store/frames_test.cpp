@@ -76,7 +76,7 @@ TEST_F(Frames, ThatWereChangedAreFound) {
   }
 }
 
-TEST_F(Frames, OfAnotherProgramAreNotTouched) {
+TEST_F(Frames, LeavesFilesOfOtherPrograms) {
   add("P1", 1, {});
   SQLite::Database(path_, SQLite::OPEN_READWRITE).exec("CREATE TABLE frames (a TEXT)");
   EXPECT_THROW(add("P2", 1, kSome), StoreError);

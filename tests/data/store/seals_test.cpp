@@ -233,7 +233,7 @@ TEST(SealsOfOldVersions, AreMadeByTheMigration) {
       contains(error_of(read), "participant P1, session 1, trial 2, attempt 1: was changed"));
 }
 
-TEST(SealedValues, AreToldApart) {
+TEST(SealedValues, DifferInSeal) {
   const auto seal = [](const auto&... values) {
     SealedValues row;
     row.begin("row");

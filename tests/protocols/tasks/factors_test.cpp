@@ -103,7 +103,7 @@ TEST(Factors, SetTheStandardAndTheComparison) {
   EXPECT_EQ(seen.size(), 6U);
 }
 
-TEST(Factors, OfOneBlockChangeNoOther) {
+TEST(Factors, ChangeOneBlockOnly) {
   for (const char* const mixing : {"mixed", "blocked"}) {
     const Protocol plain = parsed(task_study()),
                    crossed = parsed(crossed_study("constant", mixing));

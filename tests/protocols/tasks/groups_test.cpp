@@ -57,7 +57,7 @@ TEST(Groups, OrdersAreBalancedWithinEach) {
   }
 }
 
-TEST(Groups, PlansAreThoseOfTheOwnGroup) {
+TEST(Groups, PlansFollowOwnGroup) {
   nlohmann::json study = with_groups("balanced");
   study["groups"]["patch"]["old"]["blocks"] = nlohmann::json::array({study["blocks"][2]});
   const Protocol all = parsed(study);
@@ -66,7 +66,7 @@ TEST(Groups, PlansAreThoseOfTheOwnGroup) {
 }
 
 /// Draws follow seed and number: those of a participant do not depend on groups.
-TEST(Groups, DrawsAreThoseOfTheNumber) {
+TEST(Groups, DrawsFollowNumber) {
   nlohmann::json study = with_groups("balanced");
   study.erase("block_order");
   study["groups"].erase("patch");

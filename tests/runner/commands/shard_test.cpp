@@ -66,7 +66,7 @@ TEST(Shards, AreGivenAsPartOfACount) {
                   std::string(bad) + "'");
 }
 
-TEST(Shards, OfASlurmArrayAreCountedFromItsFirstTask) {
+TEST(Shards, CountFromFirstTaskOfSlurmArray) {
   const auto task = [](const char* id, const char* least, const char* count) {
     return std::map<std::string, std::string>{{"SLURM_ARRAY_TASK_ID", id},
                                               {"SLURM_ARRAY_TASK_MIN", least},

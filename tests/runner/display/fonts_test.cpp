@@ -36,7 +36,7 @@ TEST(Fonts, BeginWithOneForEuropeanScripts) {
   EXPECT_EQ(none[0].path, plain[0].path);
 }
 
-TEST(Fonts, OfOtherScriptsHaveOnlyTheirLetters) {
+TEST(Fonts, HaveOnlyLettersOfTheirScript) {
   const std::vector<FontChoice> choices = choose_fonts({"Anna \u05D0\u05D1", "\u0531 \u2660"});
   if (choices.empty()) GTEST_SKIP() << "no TrueType font is installed";
   EXPECT_TRUE(has(choices[0], 'A'));

@@ -204,7 +204,7 @@ TEST(NoLeak, PixelsAreTheSameForEveryShape) {
 }
 
 // The test can fail: a shape that is to be seen is drawn.
-TEST(NoLeak, WhatIsToBeSeenIsDrawn) {
+TEST(NoLeak, DrawsSeenObjects) {
   const protocols::Protocol protocol = protocols::parse_protocol_text(
       R"({"version": 2, "name": "p", "renderers": ["point"], "view": {"screen_m":
       [[-0.2, 0.2, -0.1], [0.2, 0.2, -0.1], [-0.2, 0.2, 0.1]], "eye_m": [0, -0.3, 0]},

@@ -1,4 +1,4 @@
-// What a participant sees beside touch, against the geometry of the station.
+// The participant's view beside touch, against the geometry of the station.
 
 #include "runner/display/seen.h"
 
@@ -231,7 +231,7 @@ TEST(Seen, RecordTellsLagAndDroppedFrames) {
   EXPECT_NEAR(record->lag_p99, 0.009, 1e-9);
 }
 
-TEST(Seen, LuminanceIsThatOfSrgb) {
+TEST(Seen, LuminanceFollowsSrgb) {
   EXPECT_EQ(grey_of(0), 0);
   EXPECT_NEAR(grey_of(1), 1, 1e-6);
   EXPECT_NEAR(grey_of(0.2140), 0.5, 1e-3);

@@ -27,7 +27,7 @@ Vec3 point_around(Random& random, const Vec3& middle, double reach) {
   return point;
 }
 
-TEST(DistanceField, OfAnLShapeIsExactToASpacing) {
+TEST(DistanceField, IsExactToASpacingOnLShape) {
   const DistanceField field(test::placed(stimuli::solids::prism(kEll, 0.03).soup));
   constexpr std::uint64_t kSeed = 1;
   Random random(kSeed);
@@ -67,7 +67,7 @@ TEST(DistanceField, ASeamIsNotASurface) {
 }
 
 // If the surface has no stiffness, the first layer with stiffness is felt.
-TEST(DistanceField, IsThatOfTheFirstLayerWithStiffness) {
+TEST(DistanceField, StartsAtFirstFeltLayer) {
   stimuli::ObjectSpec cube;
   cube.shape = stimuli::ShapeKind::cube;
   cube.material.layers = {{0.004, 0, 0, {}}, {0.008, 500, 0, {}}, {0.016, 900, 0, {}}};

@@ -80,7 +80,7 @@ TEST(LevelPercept, StiffnessIsTheMeanOfForceOverDepth) {
   EXPECT_DOUBLE_EQ(percept.stiffness().value_or(0), 200);
 }
 
-TEST(LevelPercept, ARadiusIsThatOfTheBallThroughTheFeltPlaces) {
+TEST(LevelPercept, RadiusFitsBallThroughFeltPlaces) {
   const auto protocol =
       study({R"("shape": "sphere", "radius_m": 0.03, "position_m": [0.01, 0, 0])"}, "/radius_m",
             "0.02, 0.04");

@@ -38,7 +38,7 @@ void expect_same(const ShapeObserver& a, const ShapeObserver& b) {
 
 // A percept with weight 1 - exp(-(moved + turn_length turned) / movement_scale) equals one with
 // that beta.
-TEST(ObserverEvidence, OfAContactGrowsWithMovementAndTurn) {
+TEST(ObserverEvidence, GrowsWithMovementAndTurn) {
   const ShapeHypotheses hypotheses(four_shapes());
   struct {
     double moved, turned, weight;
@@ -78,7 +78,7 @@ TEST(ObserverEvidence, DoesNotGrowWithoutMovement) {
   expect_same(observer, once);
 }
 
-TEST(ObserverEvidence, OfFreeSpaceHasFullWeightWithEvidenceByMovement) {
+TEST(ObserverEvidence, GivesFreeSpaceFullWeight) {
   const ShapeHypotheses hypotheses(four_shapes());
   ShapeObserver observer(hypotheses, by_movement());
   observer.update(free_space());

@@ -134,7 +134,7 @@ TEST_F(Box, APathMayHaveColons) {
   EXPECT_NO_THROW(ResponseBox(path + ":19200", {}, clock_, [] {}));
 }
 
-TEST_F(Box, WhatIsNoPortIsRefused) {
+TEST_F(Box, RefusesOtherFiles) {
   EXPECT_THROW(ResponseBox("/dev/null", {}, clock_, [] {}), std::runtime_error);
   EXPECT_THROW(ResponseBox("/no/such", {}, clock_, [] {}), std::runtime_error);
   EXPECT_THROW(ResponseBox(terminal_.path + ":123", {}, clock_, [] {}), std::invalid_argument);

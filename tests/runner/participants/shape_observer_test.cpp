@@ -85,7 +85,7 @@ TEST_F(TwoSpheres, FreeSpaceInsideOneAndOutsideTheOther) {
   EXPECT_LT(observer_.probability(1), 0.5);
 }
 
-TEST_F(TwoSpheres, FreeSpaceOfARayIsThatOfTheWholeStylus) {
+TEST_F(TwoSpheres, RayFreesSpaceOfWholeStylus) {
   Percept p;
   p.ray = true;
   p.tip = {0.0325, -0.07, 0};

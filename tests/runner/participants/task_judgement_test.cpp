@@ -45,7 +45,7 @@ TEST(TaskJudgement, ComparesAccordingToTheNormalDistribution) {
   }
 }
 
-TEST(TaskJudgement, OfThreeIntervalsTheLargestEstimateIsChosen) {
+TEST(TaskJudgement, ChoosesLargestOfThreeEstimates) {
   Judge judge(compare(R"(, "intervals": 3)"));
   expect_share(share(judge, "3", {kStandard, kStandard, at(400)}), 1.0 / 3, "all alike");
   EXPECT_GT(share(judge, "2", {kStandard, at(700), kStandard}), 0.96);

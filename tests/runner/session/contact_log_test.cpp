@@ -211,7 +211,7 @@ Recomputed recompute(const data::TrialRecord& record, const stimuli::ObjectSpec&
   return out;
 }
 
-TEST(ContactLog, OfASimulatedStudyMatchesItsSamples) {
+TEST(ContactLog, MatchesSamplesOfSimulatedStudy) {
   const protocols::Protocol protocol = protocols::parse_protocol_text(
       R"({"version": 1, "name": "touched", "samples": true,
           "stimuli": [{"name": "sphere", "shape": "sphere", "radius_m": 0.03},

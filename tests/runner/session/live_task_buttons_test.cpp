@@ -98,7 +98,7 @@ class LiveTaskButtons : public LiveSessions {
   std::atomic<int> button_{1}, since_page_{0};
 };
 
-TEST_F(LiveTaskButtons, OfTheDeviceAnswerPagesTrialsAndConfidence) {
+TEST_F(LiveTaskButtons, AnswerWithDevice) {
   FakeDevice device([this](int) {
     const int button = held();
     return at(0.1, false, static_cast<std::uint8_t>(button == 0 ? 0 : 1U << (button - 1)));
@@ -124,7 +124,7 @@ TEST_F(LiveTaskButtons, TheConsoleNamesTheCurrentQuestion) {
   }
 }
 
-TEST_F(LiveTaskButtons, OfAGamepadAnswerPagesTrialsAndConfidence) {
+TEST_F(LiveTaskButtons, AnswerWithGamepad) {
   display::JoystickKeys keys(
       {{"button 1", "1"}, {"button 2", "2"}, {"button 3", "3"}, {"axis 1 +", "space"}});
   std::int64_t next = 0;

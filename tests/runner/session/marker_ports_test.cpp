@@ -191,7 +191,7 @@ TEST_F(ParallelMarkers, SyncMarkersKeepInStepWithTheSeconds) {
   EXPECT_GT(fake_.puts[7].at - fake_.puts[1].at, std::chrono::milliseconds(1500));
 }
 
-TEST(MarkerPorts, WhatIsNoPortIsRefused) {
+TEST(MarkerPorts, RefusesOtherFiles) {
   for (const char* name :
        {"parport:", "parport:/dev/null", "parport:/no/such", "serial:/dev/null",
         "parport:/dev/null:0", "parport:/dev/null:101", "serial:/dev/null:9600:0",

@@ -45,7 +45,7 @@ Vec3 no_field(const data::SampleRecord&, const Vec3&) { return Vec3(0); }
 /// b u x v, u = +z.
 Vec3 curl(const data::SampleRecord&, const Vec3& v) { return 10.0 * Vec3(-v.y, v.x, 0); }
 
-TEST(ReachMeasures, StraightMovementIsThatOfLeastJerk) {
+TEST(ReachMeasures, StraightMovementFollowsLeastJerk) {
   const data::ReachRecord reach = reach_measures(
       movement(none, no_force), protocols::ReachTrial::field, kTarget, kPeriod, no_field);
   EXPECT_EQ(reach.kind, "field");

@@ -97,7 +97,7 @@ TEST_F(ReachSession, HandIsPushedAsideAndLearns) {
   // The curl field pushes to the left, some 25 mm at first.
   EXPECT_GT(in.front(), 10);
   EXPECT_LT(mean(in, in.size() - 10, in.size()), 0.4 * in.front());
-  // What was learnt pushes to the right without the field, and is forgotten.
+  // The learnt force pushes to the right without the field, and is forgotten.
   EXPECT_LT(after.front(), -5);
   EXPECT_GT(mean(after, after.size() - 5, after.size()), 0.6 * after.front());
 }

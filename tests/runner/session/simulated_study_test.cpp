@@ -325,7 +325,7 @@ TEST_F(SimulatedStudy, PatchesAreCheckedAndChangeTheChecksum) {
 }
 
 // A checksum reported with results is that of the file published with them.
-TEST_F(SimulatedStudy, ChecksumsAreThoseOfTheFrozenFiles) {
+TEST_F(SimulatedStudy, ChecksumsEqualFrozenFiles) {
   for (const int version : participants::participant_versions()) {
     std::ifstream file(PALPATE_SOURCE_DIR "/runner/participants/simulated_v" +
                        std::to_string(version) + ".json");

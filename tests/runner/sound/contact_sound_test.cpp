@@ -42,7 +42,7 @@ struct Hand {
   }
 };
 
-/// What is heard, block by block, and the ticks that reach the sound before each.
+/// The sound, block by block, and the ticks that reach the sound before each.
 struct Ear {
   ContactSound sound{kRate, kLag, 3};
   std::vector<double> left, right;

@@ -31,7 +31,7 @@ class Cable {
   }
   void play(std::span<const std::int16_t> frames) {
     const std::lock_guard lock(mutex_);
-    // What is late is played late: silence in between.
+    // A late sound is played late: silence in between.
     while (until(samples_.size()) < 0) samples_.push_back(0);
     for (std::size_t i = 0; i < frames.size(); i += 2) samples_.push_back(frames[i]);
   }

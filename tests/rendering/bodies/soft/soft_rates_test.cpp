@@ -27,7 +27,7 @@ double lowest(double young, double damping) {
   return std::numeric_limits<double>::infinity();
 }
 
-TEST(SoftRates, AreThoseOfTheMapInTheReadme) {
+TEST(SoftRates, EqualMapInReadme) {
   std::ifstream in(PALPATE_SOURCE_DIR "/rendering/README.md");
   const std::string readme{std::istreambuf_iterator<char>(in), {}};
   struct Row {

@@ -43,7 +43,7 @@ Vec3 random_step(Random& random, double size) {
   return {one(), one(), one()};
 }
 
-TEST(SoftSolid, VolumesAndMassesAreThoseOfTheShapes) {
+TEST(SoftSolid, VolumesAndMassesEqualShapes) {
   EXPECT_NEAR(Solid(soft_mesh(ShapeKind::box, 6), {}).volume(), 0.06 * 0.05 * 0.03, 1e-15);
   const double cylinder = M_PI * 0.03 * 0.03 * 0.05, ball = 4.0 / 3 * M_PI * 0.03 * 0.03 * 0.03;
   EXPECT_NEAR(Solid(soft_mesh(ShapeKind::cylinder, 12), {}).volume() / cylinder, 1, 0.03);

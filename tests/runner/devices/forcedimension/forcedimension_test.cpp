@@ -199,7 +199,7 @@ TEST_F(ForceDimension, ADeviceIsIdentifiedByItsSerialNumberNotItsIndex) {
       << refusal();
 }
 
-TEST_F(ForceDimension, WhatCannotBeOpenedSaysWhy) {
+TEST_F(ForceDimension, NamesReasonOfFailedOpening) {
   one().in_use = 1;
   EXPECT_NE(refusal().find("another program uses it"), std::string::npos) << refusal();
   one().in_use = 0;

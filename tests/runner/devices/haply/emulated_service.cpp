@@ -60,7 +60,7 @@ Json config_of(const EmulatedArm& arm) {
   return out;
 }
 
-/// What a client reads for a place of the hand in the world.
+/// The position that a client reads for a place of the hand in the world.
 std::array<double, 3> cursor_of(const EmulatedArm& arm, std::array<double, 3> at) {
   if (!ends(arm.preset)) at[1] += kBase_y;
   if (starts(arm.preset, "led")) at[0] = -at[0], at[1] = -at[1];

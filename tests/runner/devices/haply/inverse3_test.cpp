@@ -311,7 +311,7 @@ TEST_F(Inverse3, AStateThatNeverChangesIsStale) {
   }));
 }
 
-TEST_F(Inverse3, WhatCannotBeOpenedSaysWhy) {
+TEST_F(Inverse3, NamesReasonOfFailedOpening) {
   const auto said = [this](const std::function<void(EmulatedArm&)>& change) {
     service_.with([&](EmulatedArm& arm) {
       arm = EmulatedArm{};

@@ -213,7 +213,7 @@ TEST_F(Touch, TwoDevicesAreIdentifiedByNameAndShareOneScheduler) {
   EXPECT_THROW(check(config_), std::invalid_argument);
 }
 
-TEST_F(Touch, NamesAreThoseOfTheMakersSetup) {
+TEST_F(Touch, NamesEqualMakersSetup) {
   const palpate::testing::TemporaryFolder home;
   std::filesystem::create_directory(home / "config");
   for (const char* name : {"Left.config", "Default Device.config", "notes.txt"})

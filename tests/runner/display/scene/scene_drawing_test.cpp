@@ -130,7 +130,7 @@ TEST(ContactPlacesTest, TheirForcesSumToTheForceOnTheHand) {
         path, 1);
 }
 
-TEST(TorqueTest, OfTheDevicesEqualsThatOfTheContactsExceptTorsion) {
+TEST(TorqueTest, DevicesEqualContactsExceptTorsion) {
   const rendering::Scene scene({object_of(stimuli::cube(0.05), {0, 0, 0}, 0)});
   rendering::RenderState state = scene.initial_state();
   SceneMoment moment;

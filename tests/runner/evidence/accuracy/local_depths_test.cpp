@@ -98,7 +98,7 @@ TEST(LocalDepths, AreLocalMinimaOfTheReportedDepth) {
   }
 }
 
-TEST(LocalDepths, AreThoseOfAFinePolyhedron) {
+TEST(LocalDepths, EqualFinePolyhedron) {
   // Each has a counterpart among the polyhedron's and vice versa, except for a few that are about
   // to appear or vanish.
   for (const stimuli::ShapeKind shape : kShapes) {
@@ -131,7 +131,7 @@ TEST(LocalDepths, AreThoseOfAFinePolyhedron) {
   }
 }
 
-TEST(LocalDepths, OfAPointTheLeastIsTheSignedDistance) {
+TEST(LocalDepths, LeastEqualsSignedDistanceOfPoint) {
   constexpr std::uint64_t kSeed = 6;
   Random random(kSeed);
   for (const stimuli::ShapeKind shape : kShapes) {
@@ -177,7 +177,7 @@ TEST(LocalDepths, SegmentsThatStayOutHaveNone) {
   }
 }
 
-TEST(LocalDepths, OfAPolyhedronTheLeastIsTheReference) {
+TEST(LocalDepths, LeastEqualsReferenceOfPolyhedron) {
   constexpr std::uint64_t kSeed = 8;
   Random random(kSeed);
   for (const stimuli::ShapeKind shape : kShapes) {

@@ -15,7 +15,7 @@ namespace palpate::runner::evidence {
 namespace {
 
 // Whatever the source of the truth, closed forms included: outside all parts, at a local minimum.
-TEST(UnionStudy, TheExactDisplacementsAreThoseOfIdealTools) {
+TEST(UnionStudy, ExactDisplacementsEqualIdealTools) {
   for (const UnionCaseKind& kind : union_case_kinds()) {
     for (std::uint64_t seed = 1; seed <= 2; ++seed) {
       const UnionCase one = kind.draw(seed, 700);

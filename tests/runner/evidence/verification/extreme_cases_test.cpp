@@ -48,7 +48,7 @@ class ContactDropper final : public rendering::Renderer {
   mutable int count_ = 0;
 };
 
-TEST_P(Extreme, OfARendererThatDropsContactsFails) {
+TEST_P(Extreme, FailsWhenRendererDropsContacts) {
   // Skip the million triangles: they take long and add nothing here.
   if (GetParam().name == std::string("million-triangles")) return;
   const ExtremeResult result = GetParam().run(ContactDropper());

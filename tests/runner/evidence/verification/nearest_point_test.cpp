@@ -53,7 +53,7 @@ TEST(NearestPoint, WithoutCommonPointsIsEmpty) {
 }
 
 // A vector is as far from a cone as it is from its nearest point there.
-TEST(DistanceToCone, IsThatOfTheNearestPoint) {
+TEST(DistanceToCone, EqualsNearestPoint) {
   const std::array<Vec3, 3> corner{Vec3(1, 0, 0), Vec3(0, 1, 0), Vec3(0, 0, 1)};
   EXPECT_EQ(distance_to_cone({1, 2, 3}, corner), 0);
   EXPECT_EQ(distance_to_cone({1, 2, -3}, corner), 3);

@@ -182,9 +182,7 @@ TEST(Search, FindsNonFiniteResults) {
   EXPECT_GT(search_with(Broken::How::infinite).not_finite, 50u);
 }
 
-TEST(Search, FindsForcesThatAreNotThoseOfTheContact) {
-  EXPECT_GT(search_with(Broken::How::weak).wrong_force, 50u);
-}
+TEST(Search, FindsWrongForces) { EXPECT_GT(search_with(Broken::How::weak).wrong_force, 50u); }
 
 TEST(Search, FindsWalksWithoutEnd) { EXPECT_GT(search_with(Broken::How::endless).endless, 50u); }
 

@@ -81,7 +81,7 @@ TEST(SurfaceStroke, KeepsItsPaceAndDepth) {
   }
 }
 
-TEST(SurfaceStroke, OfSmallThingsIsSlowerAndLessDeep) {
+TEST(SurfaceStroke, StrokesSmallObjectsSlowerAndLessDeep) {
   SurfaceStrokeSettings settings;
   settings.radius = 0.006;
   settings.side = false;

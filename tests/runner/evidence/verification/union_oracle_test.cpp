@@ -68,7 +68,7 @@ void expect_near(const Vec3& found, const Vec3& expected, double tolerance, cons
 }
 
 // The sums are those of the brute-force reference for one part.
-TEST(UnionOracle, DepthIsThatOfTheReference) {
+TEST(UnionOracle, DepthEqualsReference) {
   for (std::uint64_t seed = 0; seed < 300; ++seed) {
     Random random(seed, {1});
     const auto mesh = std::make_shared<const stimuli::ConvexMesh>(random_solid(random));
