@@ -13,6 +13,7 @@
 #include "stimuli/exact_side.h"
 #include "stimuli/flat_faces.h"
 #include "stimuli/mesh_names.h"
+#include "stimuli/nearest_on_triangle.h"
 
 namespace palpate::stimuli {
 namespace {
@@ -108,6 +109,26 @@ class Tree {
     Box box;
     for (const Index v : surface_.triangles[t]) box.add(surface_.vertices[v]);
     return box;
+  }
+
+  /// The triangles whose boxes meet a box, ascending.
+  std::vector<Index> meeting(const Box& box) const {
+    const SmallBox wanted(box);
+    std::vector<Index> found, todo{0};
+    while (!todo.empty()) {
+      const Index at = todo.back();
+      todo.pop_back();
+      const Node& node = nodes_[at];
+      if (!node.box.meets(wanted)) continue;
+      if (node.right != 0) {
+        todo.insert(todo.end(), {at + 1, node.right});
+        continue;
+      }
+      for (Index i = node.begin; i < node.end; ++i)
+        if (this->box(order_[i]).meets(box)) found.push_back(order_[i]);
+    }
+    std::ranges::sort(found);
+    return found;
   }
 
   /// Whether no shell has triangles of both.
@@ -328,10 +349,90 @@ class WindingCheck {
     return std::numeric_limits<double>::infinity();
   }
 
+  // Whether an edge of a triangle bounds a pocket somewhere.
+  bool edge_at_pocket(Index t, Index k) const {
+    const Vec3 a = corner(t, k), b = corner(t, k + 1);
+    const Vec3 sum = glm::normalize(area(t)) + glm::normalize(area(surface_.across[t][k]));
+    const double length = glm::length(sum);
+    if (!(length > 0)) return false;
+    return std::ranges::any_of(
+        std::array{1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 0.1, 0.5, 0.9, 0.99, 1 - 1e-3, 1 - 1e-4, 1 - 1e-5,
+                   1 - 1e-6},
+        [&](double share) {
+          return winding(glm::mix(a, b, share) + sum * (2 * tolerance_ / length)) < 0;
+        });
+  }
+
+  // The triangles that bound a pocket beside t, from edge to edge, ascending; empty: too many. A
+  // sheet ends where the surface folds back on itself.
+  std::vector<Index> sheet_of(Index t) const {
+    constexpr double kFoldsBack = -0.75;  // cosine between normals
+    constexpr std::size_t kMost = 500;
+    std::vector<Index> sheet{t};
+    for (std::size_t i = 0; i < sheet.size(); ++i) {
+      if (sheet.size() > kMost) return {};
+      const Index at = sheet[i];
+      for (Index k = 0; k < 3; ++k) {
+        const Index n = surface_.across[at][k];
+        if (std::ranges::find(sheet, n) == sheet.end() &&
+            glm::dot(glm::normalize(area(at)), glm::normalize(area(n))) > kFoldsBack &&
+            edge_at_pocket(at, k))
+          sheet.push_back(n);
+      }
+    }
+    std::ranges::sort(sheet);
+    return sheet;
+  }
+
+  // The triangles within felt_ of a place, ascending.
+  std::vector<Index> near_to(const Vec3& q) const {
+    Box reach;
+    reach.add(q - felt_);
+    reach.add(q + felt_);
+    return tree_->meeting(reach);
+  }
+
+  // m; how deep a pocket is at a place beside one of its walls, t, from which it is wide: a pocket
+  // that ends in a floor just beyond the far side. The wall opposite is then of the same sheet, and
+  // the depth is the distance to another sheet. Infinity: more than felt_, or no such pocket.
+  double depth_beside_wall(const Vec3& q, Index t) const {
+    constexpr double kNever = std::numeric_limits<double>::infinity();
+    constexpr int kSteps = 8;
+    const Vec3 normal = glm::normalize(area(t));
+    double in = 0, out = felt_;
+    while (winding(q + out * normal) < 0)
+      out = 2 * (in = out);  // ends outside of the surface's box
+    for (int i = 0; i < 50; ++i) {
+      const double middle = 0.5 * (in + out);
+      (winding(q + middle * normal) < 0 ? in : out) = middle;
+    }
+    const std::vector<Index> sheet = sheet_of(t);
+    const auto distance = [&](Index s, const Vec3& from) {
+      return nearest_on_triangle({corner(s, 0), corner(s, 1), corner(s, 2)}, from) - from;
+    };
+    const auto in_sheet = [&](Index s) { return std::ranges::binary_search(sheet, s); };
+    const Vec3 opposite = q + out * normal;
+    if (std::ranges::none_of(near_to(opposite), [&](Index s) {
+          return in_sheet(s) && glm::length(distance(s, opposite)) <= 4 * tolerance_;
+        }))
+      return kNever;
+    double least = kNever;
+    for (const Index s : near_to(q)) {
+      if (in_sheet(s)) continue;
+      const Vec3 way = distance(s, q);
+      bool within = glm::length(way) < least && glm::length(way) <= felt_;
+      for (int i = 1; i < kSteps && within; ++i)
+        within = winding(q + i / static_cast<double>(kSteps) * way) < 0;
+      if (within) least = glm::length(way);
+    }
+    return least;
+  }
+
   // Looks for a pocket outside a triangle.
   void examine(const Vec3& q, Index t, const char* why) {
     if (winding(q) >= 0) return;
-    const double depth = depth_of(q, glm::normalize(area(t)));
+    double depth = depth_of(q, glm::normalize(area(t)));
+    if (depth > felt_) depth = depth_beside_wall(q, t);
     if (depth <= felt_) {
       at_pocket_[t] = 1;
       if (depth <= deepest_.depth) return;

@@ -407,6 +407,47 @@ TEST(ClosedSurfaceTest, APocketThatAHandFeelsIsRefused) {
     EXPECT_NE(surface_refusal(pierced_plate(depth)).find("negative: "), std::string::npos) << depth;
 }
 
+// A plate with a square pocket from above whose floor is `depth` below the lower side.
+PolygonSoup deep_pocket(double depth, double width, double taper) {
+  PolygonSoup soup;
+  const auto add_square = [&](double z, double half) {
+    for (const auto& [x, y] : {std::pair(-half, -half), {half, -half}, {half, half}, {-half, half}})
+      soup.vertices.emplace_back(x, y, z);
+  };
+  add_square(0, 0.02);
+  add_square(1e-3, 0.02);
+  add_square(1e-3, width / 2);
+  add_square(-depth, width / 2 - taper);
+  soup.faces = {{3, 2, 1, 0}, {12, 13, 14, 15}};
+  for (std::uint32_t k = 0; k < 4; ++k) {
+    const std::uint32_t next = (k + 1) % 4;
+    for (std::uint32_t ring = 0; ring < 12; ring += 4)
+      soup.faces.push_back({ring + k, ring + next, ring + next + 4, ring + k + 4});
+  }
+  return soup;
+}
+
+TEST(ClosedSurfaceTest, PocketIsAsDeepAsItReachesBeyondTheOtherSide) {
+  for (const double taper : {0.0, 1e-3, 4e-3}) {
+    for (const double depth : {1e-6, 1e-5, 3.5e-5}) {
+      const stimuli::CleanedSurface cleaned = closed_surface(deep_pocket(depth, 0.01, taper));
+      double deep = 0;
+      ASSERT_EQ(std::sscanf(cleaned.notes.back().c_str(),
+                            "it passes through itself, at (%*f, %*f, %*f) m by %lf m", &deep),
+                1)
+          << cleaned.notes.back();
+      // Along the normal of a wall at 45 degrees it is deeper.
+      EXPECT_GE(deep, 0.99 * depth) << taper;
+      EXPECT_LE(deep, 1.5 * depth) << taper;
+    }
+    EXPECT_NE(surface_refusal(deep_pocket(1.2e-4, 0.01, taper)).find("negative: "),
+              std::string::npos)
+        << taper;
+  }
+  // A fin, thinner than what is felt, but high.
+  EXPECT_NE(surface_refusal(deep_pocket(3e-4, 4e-5, 0)).find("negative: "), std::string::npos);
+}
+
 // The triangles of such faces are long, so that all their boxes meet.
 TEST(ClosedSurfaceTest, FacesOfManyTrianglesAreTaken) {
   // A toothed wheel whose ends are fans, and a ring.
