@@ -112,12 +112,12 @@ LOOKS_INSIDE = {"runner/evidence/accuracy", "runner/evidence/scenes", "runner/ev
 PUBLIC = {
     "stimuli": "closed_surface face_triangles shapes convex_mesh grid_hull inset large_array layers/layer_surface mesh_file nearest_on_triangle orientation polygon_soup "
                " parts/convex_parts primitives solids/solid_mesh texture vec",
-    "rendering": "fields first_contact probe reach render_fault renderer scene tool",
+    "rendering": "fields first_contact probe reach render_fault renderer scene scene_motion tool",
     "rendering/bodies": "moving_scene",
     "runner/evidence/verification": "explain extreme_cases random_solids reference search surface_reference union_cases",
     "runner/evidence/scenes": "feature_costs scene_study stage_costs tick_costs",
     "runner/evidence/accuracy": "body_study methods paper_first_contact peers study union_study",
-    "rendering/bodies/soft": "soft_scene",
+    "rendering/bodies/soft": "segment_triangle soft_build soft_contact soft_object soft_scene",
     "protocols": "answer_keys difference factors groups json_document parse protocol schedule session_plan sight sound sweep_space "
                  "tasks/block_order tasks/block_procedures tasks/levels tasks/texts",
     "protocols/procedures": "procedure procedure_spec psychometric recovery",

@@ -10,7 +10,7 @@
 #include "data/record.h"
 #include "data/store/store.h"
 #include "protocols/protocol.h"
-#include "rendering/probe.h"
+#include "rendering/scene_motion.h"
 
 namespace palpate::runner::session {
 

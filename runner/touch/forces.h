@@ -10,6 +10,7 @@
 #include "protocols/parse.h"
 #include "rendering/probe.h"
 #include "rendering/renderer.h"
+#include "rendering/scene_motion.h"
 #include "runner/output/outputs.h"
 #include "runner/scene_builder.h"
 #include "stimuli/polygon_soup.h"

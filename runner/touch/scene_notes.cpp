@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "data/base/text.h"
+#include "rendering/bodies/soft/soft_scene.h"
 #include "runner/session/effect_check.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/mesh_file.h"

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "rendering/bodies/soft/soft_scene.h"
+#include "rendering/bodies/soft/soft_object.h"
 #include "rendering/scene.h"
 #include "rendering/tool.h"
 #include "runner/display/scene/camera.h"

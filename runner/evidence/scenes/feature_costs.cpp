@@ -10,7 +10,6 @@
 #include <utility>
 #include <vector>
 
-#include "rendering/bodies/soft/soft_scene.h"
 #include "runner/evidence/scenes/meshes.h"
 #include "runner/evidence/tick_meters.h"
 #include "runner/evidence/verification/random_solids.h"

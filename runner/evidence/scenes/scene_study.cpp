@@ -9,7 +9,6 @@
 #include <set>
 #include <utility>
 
-#include "rendering/bodies/soft/soft_scene.h"
 #include "rendering/tool.h"
 #include "runner/evidence/accuracy/methods.h"
 #include "runner/evidence/accuracy/peers.h"

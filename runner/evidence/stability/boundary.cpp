@@ -15,7 +15,8 @@
 
 #include "data/base/random.h"
 #include "rendering/bodies/moving_scene.h"
-#include "rendering/bodies/soft/soft_scene.h"
+#include "rendering/bodies/soft/soft_build.h"
+#include "rendering/bodies/soft/soft_object.h"
 #include "runner/devices/simulated.h"
 #include "runner/scene_builder.h"
 #include "runner/servo/passivity.h"
