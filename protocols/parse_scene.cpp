@@ -22,6 +22,7 @@
 #include "stimuli/mesh_file.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/shapes.h"
+#include "stimuli/solids/gmsh_file.h"
 #include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::protocols {

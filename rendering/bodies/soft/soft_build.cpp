@@ -17,6 +17,7 @@
 #include <utility>
 #include <vector>
 
+#include "stimuli/solids/gmsh_file.h"
 #include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::rendering {
