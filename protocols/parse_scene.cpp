@@ -14,6 +14,7 @@
 #include "data/base/input_file.h"
 #include "data/base/text.h"
 #include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 #include "protocols/parse.h"
 #include "protocols/parse_effects.h"
 #include "protocols/parse_sight.h"

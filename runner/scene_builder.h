@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "protocols/protocol.h"
+#include "protocols/scene_spec.h"
 #include "protocols/schedule.h"
 #include "rendering/bodies/moving_scene.h"
 #include "rendering/bodies/soft/soft_object.h"

@@ -118,15 +118,15 @@ PUBLIC = {
     "runner/evidence/scenes": "feature_costs scene_study stage_costs tick_costs",
     "runner/evidence/accuracy": "body_study methods paper_first_contact peers study union_study",
     "rendering/bodies/soft": "segment_triangle soft_build soft_contact soft_object soft_scene",
-    "protocols": "answer_keys difference factors groups json_document parse protocol schedule session_plan sight sound sweep_space "
+    "protocols": "answer_keys difference event_codes factors fault_list groups json_document object_reader parse protocol scene_spec schedule session_plan sight sound sweep_space "
                  "tasks/block_order tasks/block_procedures tasks/levels tasks/texts",
     "protocols/procedures": "procedure procedure_spec psychometric recovery",
-    "data/base": "cell_name checksum column_names group_assignment input_file json_text markdown random sobol text",
+    "data/base": "base64 cell_name checksum column_names group_assignment input_file json_text markdown random sobol text utf8",
     "data": "column_table record stored_protocol sweep_record",
     "data/files": "atomic_file atomic_folder file_permissions text_sink output_check utc",
-    "data/store": "export_log frames unmaskings participant_columns participant_groups protocol_rows schema connection station_database store sweep_file "
+    "data/store": "export_log frames unmaskings participant_columns participant_groups protocol_rows schema statement station_database store store_error sweep_file "
                   "forget task_text",
-    "data/export": "csv datasets sample_slots settings study_about delimited_row",
+    "data/export": "csv datasets sample_slots settings study_about trial_table",
     "data/merge": "merge",
     "analysis": "text",
     "analysis/input": "csv_reader trials study_record study_table sweep_table",

@@ -5,7 +5,8 @@
 #include <span>
 #include <string_view>
 
-#include "data/export/delimited_row.h"
+#include "data/export/exported_columns.h"
+#include "data/export/page_table.h"
 #include "data/files/text_sink.h"
 
 namespace palpate::data {

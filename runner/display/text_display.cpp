@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "data/base/text.h"
+#include "data/base/utf8.h"
 #include "runner/display/console_words.h"
 
 namespace palpate::runner::display {

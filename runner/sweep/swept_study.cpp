@@ -14,6 +14,7 @@
 #include "data/base/text.h"
 #include "data/stored_protocol.h"
 #include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 #include "runner/participants/simulated_settings.h"
 
 namespace palpate::runner::sweep {

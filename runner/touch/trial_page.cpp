@@ -21,6 +21,7 @@
 
 #include "analysis/report/html_page.h"
 #include "analysis/text.h"
+#include "data/base/base64.h"
 #include "data/base/text.h"
 #include "rendering/renderer.h"
 #include "runner/display/scene/drawn_mesh.h"

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "data/base/text.h"
+#include "data/base/base64.h"
 
 namespace palpate::stimuli::gltf {
 
