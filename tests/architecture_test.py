@@ -131,7 +131,7 @@ PUBLIC = {
     "analysis": "text",
     "analysis/input": "csv_reader trials study_record study_table sweep_table",
     "analysis/statistics": "analysis answer_model comparison conclusions cue_plan cue_study cues describe group_power group_simulation interval_coverage jobs mixed_model "
-                           "paired paired_evidence pattern power plan quantiles sensitivity sequential_looks "
+                           "paired paired_evidence pattern pilot power plan quantiles sensitivity sequential_looks "
                            "study_design sweep_analysis task_analysis threshold_plan",
     "analysis/movement": "comparison measures pictures",
     "analysis/figures": "panel_drawing figures svg",

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/statistics/pilot.h"
 #include "analysis/statistics/plan.h"
 #include "analysis/statistics/power.h"
 #include "runner/commands/shared/command.h"
