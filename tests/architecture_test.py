@@ -114,7 +114,7 @@ PUBLIC = {
                " parts/convex_parts primitives signed_distance solids/gmsh_file solids/solid_mesh texture vec",
     "rendering": "fields first_contact probe reach render_fault renderer scene scene_motion tool",
     "rendering/bodies": "moving_scene",
-    "runner/evidence/verification": "explain extreme_cases random_solids reference search surface_reference union_cases",
+    "runner/evidence/verification": "explain extreme_cases random_draws random_solids reference search surface_reference surface_stroke union_cases union_search",
     "runner/evidence/scenes": "feature_costs scene_study stage_costs tick_costs",
     "runner/evidence/accuracy": "body_study methods paper_first_contact peers study union_study",
     "rendering/bodies/soft": "segment_triangle soft_build soft_contact soft_object soft_scene",
@@ -142,14 +142,14 @@ PUBLIC = {
     "runner/safety": "fault_signals guarded_device shared_memory",
     "runner/sound": "loopback player sound_output sound_source",
     "runner/devices": "device_delay mouse registry self_test simulated",
-    "runner/devices/falcon": "calibration falcon stylus_from_ends",
+    "runner/devices/falcon": "calibration driver falcon stylus_from_ends",
     "runner/display": "display explore_window mailbox seen text_display timeline window",
     "runner/display/scene": "camera gl_objects picture drawn_mesh image_file painter scene_drawing "
                             "scene_renderer",
     "runner/participants": "keyboard reacher respondent response_box seen_record seen_trial simulated_settings simulated "
                            "task_participant",
     "runner/session": "device_check effect_check live_forces live_session markers recorded_outcome sample_stream session_scenes signals "
-                      "preflight run_record replay session session_end simulated_study "
+                      "preflight recorded_trial replay replay_comparison run_record session session_end simulated_study "
                       "socket_advisor station",
     "runner/output": "outputs progress_line",
     "runner/station": "admission lag_check opening protocol_check protocol_choice run_settings servo_timing sound_timing",
@@ -161,7 +161,7 @@ PUBLIC = {
     "runner/serve": "loopback network page_server served_scene served_session",
     "runner/design": "design_page protocol_file rehearsal",
     "runner/sweep": "cluster_folder cluster_job planned_sweep slurm",
-    "runner/evidence/stability": "boundary effect_stability scene_boundary",
+    "runner/evidence/stability": "boundary effect_stability integrators scene_boundary soft_rest",
     "runner/evidence": "",
     "runner/commands": "shared/command",
 }

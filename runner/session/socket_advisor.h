@@ -38,8 +38,6 @@
 
 namespace palpate::runner::session {
 
-// An external program that proposes the levels of adaptive blocks.
-
 /// What a program wants for the next trial: one of them.
 struct Proposal {
   std::optional<double> level;
@@ -47,6 +45,7 @@ struct Proposal {
   bool finished = false;             ///< the block ends
 };
 
+/// An external program that proposes the levels of adaptive blocks.
 class LevelAdvisor {
  public:
   virtual ~LevelAdvisor() = default;

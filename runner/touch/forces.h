@@ -17,8 +17,6 @@
 
 namespace palpate::runner::touch {
 
-// CSV files: the path of a stylus, read, and the forces along it, written.
-
 inline constexpr const char* kTrajectoryHeader = "t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z";
 inline constexpr const char* kSideHeader = ",side_x,side_y,side_z";  ///< may follow
 inline constexpr std::size_t kMostPoses = 4'000'000;                 // more than an hour at 1 kHz

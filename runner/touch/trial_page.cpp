@@ -28,6 +28,7 @@
 #include "runner/display/seen.h"
 #include "runner/safety/fault_signals.h"
 #include "runner/scene_builder.h"
+#include "runner/session/recorded_trial.h"
 #include "runner/session/replay.h"
 #include "stimuli/texture.h"
 

@@ -2,6 +2,7 @@
 // A box as a glTF file, put together from the specification.
 
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
