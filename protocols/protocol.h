@@ -137,6 +137,7 @@ struct ReachingSpec {
   std::vector<int> channels;  ///< of each target: index into Protocol::stimuli; empty: no clamps
 };
 
+/// A block of trials of one task in version 2 of a protocol.
 struct TaskBlock {
   /// Unique within the protocol, except among the cells of a block; "": of the study of shapes.
   std::string name;

@@ -1,6 +1,6 @@
 #pragma once
 // Contact with one convex part that the probe did not touch at the last tick: separating plane,
-// approach, first contact. Mesh frame unless said otherwise. Included by tick.h alone.
+// approach, first contact. Mesh frame and SI units unless said otherwise. Included by tick.h alone.
 //
 // Probe is PointProbe or SegmentProbe.
 

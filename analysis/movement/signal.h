@@ -45,8 +45,8 @@ std::vector<T> part_of(const std::vector<T>& all, const Stretch& stretch) {
 /// \param speed  not negative, so that the spectrum is maximal at 0 Hz. \param rate  Hz
 std::optional<double> sparc(const std::vector<double>& speed, double rate);
 
-/// Dimensionless jerk: - ln(T^3 / v_max^2 x integral of the vector jerk's square), their table 3.
-/// None: too short, or no speed or jerk.
+/// Dimensionless jerk: - ln(T^3 / v_max^2 x integral of the vector jerk's square), table 3 of the
+/// same paper. None: too short, or no speed or jerk.
 /// \param path  of one movement
 std::optional<double> log_dimensionless_jerk(const std::vector<Vec3>& path, double rate);
 /// As in the authors' program: with the second difference of speed in place of the vector jerk.

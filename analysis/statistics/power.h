@@ -76,7 +76,7 @@ struct ModelAnswer {
 };
 
 /// Single trials of one participant from the same model, in the order of a schedule: simulated data
-/// with the planned effect. Intercept and gains are drawn first.
+/// with the planned effect, or with none (without_effect). Intercept and gains are drawn first.
 /// \param typical_time  s, geometric mean over participants with the reference; the model has none
 std::vector<ModelAnswer> draw_answers(const StudyModel& model, double typical_time,
                                       const std::vector<ModelTrial>& trials, Random& random);

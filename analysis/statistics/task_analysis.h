@@ -70,7 +70,7 @@ struct MagnitudeEstimation {
 /// \param modulus  the experimenter gave the number of a standard
 MagnitudeEstimation magnitude_estimation(const std::vector<MagnitudeTrial>& trials, bool modulus);
 
-/// One setting of a level to equal a standard.
+/// One setting of a level to equal a standard, by the method of adjustment.
 struct AdjustmentTrial {
   std::size_t participant = 0;
   double standard = 0, setting = 0;
