@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "data/base/text.h"
+#include "data/base/utf8.h"
 
 namespace palpate::analysis {
 

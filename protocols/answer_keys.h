@@ -1,10 +1,8 @@
 #pragma once
-// Names of the keyboard's keys in protocols, and codes of events.
+// Names of the keyboard's keys in protocols.
 
 #include <map>
 #include <string>
-
-#include "protocols/protocol.h"
 
 namespace palpate::protocols {
 
@@ -24,22 +22,5 @@ class KeysTaken {
  private:
   std::map<std::string, std::string> names_;  ///< by one_key()
 };
-
-// Event codes for other recorders: one byte for each event of a session.
-
-class ObjectReader;
-
-/// By the event's name, "trial_start" or "response:cube"; 1 to 255.
-using EventCodes = std::map<std::string, int>;
-
-/// Codes of the events that every protocol has.
-EventCodes usual_event_codes();
-
-/// Reads `codes` of a protocol whose stimuli, keys and blocks are read already. Events without a
-/// code of their own keep the usual one.
-EventCodes read_event_codes(ObjectReader& reader, const Protocol& protocol);
-
-/// Codes of a valid protocol, read from its text; only a live session needs them.
-EventCodes event_codes(const Protocol& protocol);
 
 }  // namespace palpate::protocols

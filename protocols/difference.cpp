@@ -6,6 +6,7 @@
 #include <set>
 #include <string_view>
 
+#include "protocols/fault_list.h"
 #include "protocols/json_document.h"
 
 namespace palpate::protocols {

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <nlohmann/json_fwd.hpp>
 
-#include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 #include "protocols/parse_scene.h"
 #include "protocols/protocol.h"
 

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 #include "protocols/protocol.h"
 
 namespace palpate::protocols {

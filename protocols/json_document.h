@@ -1,75 +1,13 @@
 #pragma once
-// A JSON document with the line of every value and duplicate keys, which nlohmann-json drops, and
-// the reading of its objects.
+// A JSON document with the line of every value and duplicate keys, which nlohmann-json drops.
 
-#include <cstddef>
-#include <cstdint>
-#include <initializer_list>
 #include <nlohmann/json.hpp>
-#include <optional>
-#include <set>
 #include <string>
-#include <string_view>
-#include <unordered_map>
-#include <utility>
-#include <vector>
 
-#include "protocols/parse.h"
-#include "stimuli/vec.h"
+#include "protocols/fault_list.h"
+#include "protocols/object_reader.h"
 
 namespace palpate::protocols {
-
-/// A name is part of file names and heads a column.
-inline constexpr std::size_t kMaxName = 64;
-
-/// Hash of a JSON pointer: FNV-1a of its characters, continued from that of its parent. A collision
-/// would at worst show the wrong line in a message.
-class PointerHash {
- public:
-  PointerHash() = default;
-  explicit PointerHash(std::string_view pointer) { add(pointer); }
-  /// Of a member or element.
-  PointerHash child(std::string_view token) const;
-  std::uint64_t value() const { return value_; }
-
- private:
-  void add(std::string_view characters);
-  std::uint64_t value_ = 14695981039346656037U;
-};
-
-/// The faults of one file in the order found: the first ones in full, the rest as a count.
-class FaultList {
- public:
-  explicit FaultList(std::string file) : file_(std::move(file)) {}
-
-  /// pointer: JSON pointer of the value, or of where a missing one should be.
-  void add(const std::string& pointer, const std::string& expected);
-  void add_syntax_error(int line, int column, const std::string& expected);
-  void set_line(PointerHash pointer, int line) { lines_[pointer.value()] = line; }
-
-  bool empty() const { return faults_.empty(); }
-  /// The number so far; compare later to see whether faults were added.
-  std::size_t count() const { return faults_.size() + unlisted_; }
-  /// Whether further faults are only counted: then their texts need not be made.
-  bool full() const { return faults_.size() >= kMostListed; }
-  const std::string& file() const { return file_; }
-  /// \throws InputError unless the list is empty.
-  void throw_if_any() const;
-
- private:
-  static constexpr std::size_t kMostListed = 1000;
-
-  int line_of(std::string_view pointer) const;
-
-  std::string file_;
-  std::unordered_map<std::uint64_t, int> lines_;  // by PointerHash
-  std::vector<Fault> faults_;
-  std::size_t unlisted_ = 0;
-};
-
-/// The pointer of a member or element, with ~ and / escaped (RFC 6901).
-std::string child_pointer(const std::string& parent, const std::string& key);
-std::string child_pointer(const std::string& parent, std::size_t index);
 
 /// Reads JSON (RFC 8259, UTF-8). Duplicate keys become faults. \throws InputError with line and
 /// column where the text is not JSON; with the location where it is nested too deeply, has too many
@@ -78,117 +16,5 @@ nlohmann::json read_json(const std::string& text, FaultList& faults);
 
 /// The contents of a file. \throws InputError where it cannot be read or is above 16 MiB.
 std::string read_text_file(const std::string& path);
-
-// Reads the members of a JSON object into plain values and records every fault with its location.
-// A value that is at fault leaves the variable as it was.
-
-/// The range of numbers that a key accepts.
-struct NumberRange {
-  double min, max;
-  const char* unit = "";
-  bool above_min = false;  ///< min itself is excluded
-};
-
-enum class Presence { optional, required };
-
-/// ", found ..." with the value as written, shortened.
-std::string found_text(const nlohmann::json& value);
-
-/// One of several words. False and a fault otherwise.
-template <class T, class Options = std::initializer_list<std::pair<const char*, T>>>
-bool read_choice(const nlohmann::json& value, const std::string& pointer, T& out,
-                 const Options& options, FaultList& faults) {
-  std::string words;
-  for (const auto& [word, meaning] : options) {
-    if (value.is_string() && value.get_ref<const std::string&>() == word) {
-      out = meaning;
-      return true;
-    }
-    words += (words.empty() ? "'" : ", '") + std::string(word) + "'";
-  }
-  faults.add(pointer,
-             "expected " + (options.size() > 1 ? "one of " + words : words) + found_text(value));
-  return false;
-}
-
-/// A number of a range. False and a fault otherwise.
-bool read_number(const nlohmann::json& value, const std::string& pointer, double& out,
-                 const NumberRange& range, FaultList& faults);
-
-/// A text without U+0000, of at most `most` bytes. False and a fault otherwise.
-bool read_text(const nlohmann::json& value, const std::string& pointer, std::string& out,
-               std::size_t most, FaultList& faults);
-
-/// A unit quaternion [w, x, y, z]; within 1e-6 of unit length, then normalised. nullopt and a fault
-/// otherwise.
-std::optional<Quat> read_quaternion(const nlohmann::json& value, const std::string& pointer,
-                                    FaultList& faults);
-
-class ObjectReader {
- public:
-  /// Records a fault when the value is not an object; then its members count as missing, without
-  /// further faults.
-  ObjectReader(const nlohmann::json& value, std::string pointer, FaultList& faults);
-
-  const std::string& pointer() const { return pointer_; }
-  std::string pointer(const std::string& key) const { return child_pointer(pointer_, key); }
-  FaultList& faults() { return faults_; }
-  bool has(const std::string& key) const { return object_ != nullptr && object_->contains(key); }
-
-  void number(const char* key, double& out, const NumberRange& range,
-              Presence presence = Presence::optional);
-  void number(const char* key, std::optional<double>& out,
-              const NumberRange& range);  ///< null: none
-  void integer(const char* key, int& out, const NumberRange& range,
-               Presence presence = Presence::optional);
-  void integer(const char* key, std::optional<int>& out, const NumberRange& range);  ///< null: none
-  /// Whole numbers that an int may not hold; range.max at most 2^53. null: none
-  void count(const char* key, std::size_t& out, const NumberRange& range);  ///< required
-  void count(const char* key, std::optional<std::size_t>& out, const NumberRange& range);
-  void seed(const char* key, std::uint64_t& out);
-  void boolean(const char* key, bool& out);
-  void text(const char* key, std::string& out);
-  void text(const char* key, std::string& out, std::size_t most);  ///< required; bytes
-  void checksum(const char* key, std::string& out);                ///< required; SHA-256 in hex
-  void name(const char* key, std::string& out);  ///< required; letters, digits, '-'
-  void vector(const char* key, Vec3& out, const NumberRange& range,
-              Presence presence = Presence::optional);
-  void quaternion(const char* key, Quat& out);
-
-  /// Whether the object has a member "sha256" (json_checksum); a wrong one is a fault.
-  bool sealed();
-
-  template <class T, class Options = std::initializer_list<std::pair<const char*, T>>>
-  void choice(const char* key, T& out, const Options& options,
-              Presence presence = Presence::optional) {
-    const nlohmann::json* const value = member(key, presence);
-    if (value != nullptr) read_choice(*value, pointer(key), out, options, faults_);
-  }
-
-  /// The member as JSON; nullptr when it is missing (a fault when it is required).
-  const nlohmann::json* member(const char* key, Presence presence = Presence::optional);
-  /// The member if it is an array of least .. most elements; else nullptr and a fault.
-  const nlohmann::json* array(const char* key, std::size_t least, std::size_t most,
-                              Presence presence = Presence::optional);
-
-  /// Reads an object within this one: read(ObjectReader&). Its unknown keys become faults.
-  template <class Read>
-  void section(const char* key, Read read, Presence presence = Presence::optional) {
-    const nlohmann::json* const value = member(key, presence);
-    if (value == nullptr) return;
-    ObjectReader inner(*value, pointer(key), faults_);
-    read(inner);
-    inner.refuse_unknown_keys();
-  }
-
-  /// Makes every key that was not asked for a fault, with the most similar known one.
-  void refuse_unknown_keys();
-
- private:
-  const nlohmann::json* object_;  // nullptr: not an object
-  std::string pointer_;
-  FaultList& faults_;
-  std::set<std::string> known_;
-};
 
 }  // namespace palpate::protocols

@@ -1,5 +1,6 @@
 #pragma once
-// The order of stimuli within a block, under limits on repetition (max_run, min_distance).
+// The order of stimuli within a block, under limits on repetition (max_run, min_distance), and of
+// conditions over participants (counterbalancing).
 
 #include <cstddef>
 #include <string>
@@ -9,8 +10,6 @@
 #include "protocols/protocol.h"
 
 namespace palpate::protocols {
-
-// Counterbalancing of conditions over participants.
 
 /// Number of rows of a balanced Latin square of n conditions: n where n is even, 2 n
 /// where it is odd (1 for a single condition).

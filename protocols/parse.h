@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "protocols/protocol.h"
+#include "protocols/scene_spec.h"
 
 namespace palpate::protocols {
 

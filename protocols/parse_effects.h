@@ -1,7 +1,7 @@
 #pragma once
 // Reading of textures, fields and knocks of objects (scene.schema.json), for scenes and protocols.
 
-#include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 #include "protocols/parse_scene.h"
 #include "stimuli/shapes.h"
 

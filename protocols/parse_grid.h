@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 #include "protocols/procedures/procedure_spec.h"
 
 namespace palpate::protocols {

@@ -14,6 +14,7 @@
 #include "data/base/input_file.h"
 #include "data/base/text.h"
 #include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 #include "protocols/parse.h"
 #include "protocols/parse_effects.h"
 #include "protocols/parse_sight.h"
@@ -22,6 +23,7 @@
 #include "stimuli/mesh_file.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/shapes.h"
+#include "stimuli/solids/gmsh_file.h"
 #include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::protocols {

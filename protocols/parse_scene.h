@@ -4,7 +4,7 @@
 #include <memory>
 #include <string>
 
-#include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 #include "protocols/parse.h"
 #include "protocols/protocol.h"
 #include "stimuli/shapes.h"

@@ -1,7 +1,7 @@
 #pragma once
 // Reading of what is seen (protocol.v2.schema.json): keys of stimuli, and of the protocol.
 
-#include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 #include "protocols/parse_scene.h"
 #include "protocols/protocol.h"
 

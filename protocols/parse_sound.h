@@ -1,7 +1,7 @@
 #pragma once
 // Reading of what is heard of a stimulus (protocol.v2.schema.json).
 
-#include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 #include "protocols/parse_scene.h"
 #include "protocols/protocol.h"
 

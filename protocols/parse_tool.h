@@ -3,8 +3,8 @@
 
 #include <optional>
 
-#include "protocols/json_document.h"
-#include "protocols/protocol.h"
+#include "protocols/object_reader.h"
+#include "protocols/scene_spec.h"
 #include "stimuli/vec.h"
 
 namespace palpate::protocols {

@@ -14,14 +14,13 @@
 
 #include "data/base/group_assignment.h"
 #include "protocols/procedures/procedure_spec.h"
+#include "protocols/scene_spec.h"
 #include "protocols/sight.h"
 #include "protocols/sound.h"
 #include "stimuli/shapes.h"
 #include "stimuli/vec.h"
 
 namespace palpate::protocols {
-
-// A block of trials of one task in version 2 of a protocol: plain values. SI units.
 
 enum class RendererKind;
 
@@ -138,6 +137,7 @@ struct ReachingSpec {
   std::vector<int> channels;  ///< of each target: index into Protocol::stimuli; empty: no clamps
 };
 
+/// A block of trials of one task in version 2 of a protocol.
 struct TaskBlock {
   /// Unique within the protocol, except among the cells of a block; "": of the study of shapes.
   std::string name;
@@ -219,46 +219,6 @@ struct PageSpec {
   std::string version;                  ///< consent
   std::vector<PageItem> items;          ///< questionnaire
   std::vector<PagePicture> pictures{};  ///< of each screen of the text; at most so many
-};
-
-// The parts of a scene or protocol besides its objects: the tool on the stylus and the extended
-// probe (keys: scene.schema.json). SI units.
-
-/// One straight piece of a tool, in the frame of the stylus: origin at its tip, +z from tip to
-/// tail. m, of a length above 0.
-struct ToolSegmentSpec {
-  Vec3 from, to;
-};
-
-/// The tool on the stylus; without segments the plain stylus from tip to tail.
-struct ToolSpec {
-  static constexpr std::size_t kMostSegments = 16;
-  std::vector<ToolSegmentSpec> segments;
-  double radius = 0;  ///< m, on soft objects; 0: kSoftRadius. Rigid ones are touched by lines
-};
-
-/// m, default for tools and styluses on soft objects: a line without thickness would sink into an
-/// elastic solid without end.
-inline constexpr double kSoftRadius = 0.002;
-
-/// The extended probe: the virtual stylus is the real one stretched by `factor` about a pivot.
-struct ReachSpec {
-  enum class Pivot {
-    grip,   ///< the point of the stylus that the hand holds
-    tail,   ///< the stylus's end
-    point,  ///< a point that stands still in the world
-  };
-  double factor = 1;
-  Pivot pivot = Pivot::grip;
-  Vec3 point{0, 0, 0};  ///< m, world frame, of Pivot::point
-};
-
-/// A scene file as plain values.
-struct SceneSpec {
-  std::vector<stimuli::ObjectSpec> objects;
-  ToolSpec tool;
-  std::optional<ReachSpec> reach;
-  Vec3 gravity{0, 0, 0};  ///< m/s^2, on moving objects
 };
 
 enum class RendererKind { point, ray };

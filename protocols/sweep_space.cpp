@@ -10,6 +10,7 @@
 #include <string_view>
 
 #include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 
 namespace palpate::protocols {
 namespace {

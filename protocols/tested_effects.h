@@ -1,7 +1,7 @@
 #pragma once
 // The effects that a protocol names as its tests: the family of the adjusted p values.
 
-#include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 #include "protocols/protocol.h"
 
 namespace palpate::protocols {

@@ -1,5 +1,6 @@
 #pragma once
-// A contact between the probe and an object, its types, and the force that it gives.
+// Contacts between the probe and objects, their types, the wrench (force and torque) that they give
+// to the hand, and its split on two devices. Pure functions. World frame, SI units.
 
 #include <cstddef>
 #include <cstdint>
@@ -27,9 +28,6 @@ struct Contact {
   double along = 0;  ///< m, from the tip along the probe to the contact point
   ContactType type = ContactType::none;
 };
-
-// From contacts to the wrench (force and torque) on the hand and its split on two devices: pure
-// functions. World frame, SI units.
 
 /// A contact with all data that determine its force.
 struct LoadedContact {

@@ -1,6 +1,6 @@
 #pragma once
 // Contact with one convex part that the probe did not touch at the last tick: separating plane,
-// approach, first contact. Mesh frame unless said otherwise. Included by tick.h alone.
+// approach, first contact. Mesh frame and SI units unless said otherwise. Included by tick.h alone.
 //
 // Probe is PointProbe or SegmentProbe.
 
@@ -16,9 +16,6 @@
 
 namespace palpate::rendering {
 
-// Tracks a probe outside an object, near it, through one tick of motion from feature to
-// neighbouring feature: continuous collision detection without a search. Mesh frame, SI units.
-
 /// How a tick of motion near an object ended.
 struct Approach {
   enum class End : std::uint8_t { separated, entered, undecided };
@@ -28,12 +25,13 @@ struct Approach {
   double time = 0;         ///< entered: time of impact, as a fraction of the tick
 };
 
-/// Tracks the probe while both ends move linearly from `before` to `after`: the facet of M whose
-/// plane separates it is kept until the probe crosses that plane; there it either enters through
-/// the facet, or it is past a side and the facet of M beyond that side separates from then on. The
-/// times of crossing only grow, and the probe is proven to be outside up to each. So the entry
-/// found is the first one, at any speed. Undecided (rounding, or a long path around the object):
-/// use first_contact.
+/// Tracks a probe outside an object, near it, from feature to neighbouring feature: continuous
+/// collision detection without a search. Both ends move linearly from `before` to `after`. The
+/// facet of M whose plane separates it is kept until the probe crosses that plane; there it either
+/// enters through the facet, or it is past a side and the facet of M beyond that side separates
+/// from then on. The times of crossing only grow, and the probe is proven to be outside up to each.
+/// So the entry found is the first one, at any speed. Undecided (rounding, or a long path around
+/// the object): use first_contact.
 /// \param start  a feature whose plane separates the probe at `before`
 Approach approach_segment(const stimuli::ConvexMesh& mesh, ContactFeature start,
                           const LineProbe& before, const LineProbe& after);

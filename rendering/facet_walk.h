@@ -79,11 +79,10 @@ WalkResult same_feature_point(const stimuli::ConvexMesh& mesh, ContactFeature st
 
 }  // namespace palpate::rendering
 
-namespace palpate::rendering::minkowski {
-
-// The facets of M, the Minkowski sum of the object and the mirrored probe (facet_walk.h): normal,
+// The facets of M, the Minkowski sum of the object and the mirrored probe: normal,
 // penetration depth and contact point for a given probe, and which ones are adjacent. Mesh frame,
 // SI units; d = tail - tip. Internal to the walks: facet_walk.cpp and contact_detection.cpp.
+namespace palpate::rendering::minkowski {
 
 using Kind = ContactFeature::Kind;
 

@@ -16,11 +16,8 @@
 
 namespace palpate::rendering {
 
-// One convex part C and one segment S of a tool of fixed orientation: where the segment lies
-// relative to M = C (+) (-S), and where a translation of it first meets M. Steps from facet to
-// neighbouring facet of M, as the walk does (facet_walk.h). Mesh frame, m.
-
-/// A part and its search structures.
+/// A convex part C and its search structures. With a segment S of a tool of fixed orientation it
+/// forms M = C (+) (-S). Mesh frame, m.
 struct CastMesh {
   const stimuli::ConvexMesh& mesh;
   const ContactTrees& trees;
@@ -30,6 +27,7 @@ struct CastMesh {
 };
 
 /// The facet of M that holds the segment, or whose plane separates it (WalkResult::depth < 0).
+/// Steps from facet to neighbouring facet of M, as the walk does (facet_walk.h).
 /// \param start  any feature, preferably near the result; none: begins under the segment
 /// \param d      the segment from tip to tip + d; zero or below rounding: a point
 WalkResult locate(const CastMesh& part, ContactFeature start, const Vec3& tip, const Vec3& d);

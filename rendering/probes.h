@@ -68,8 +68,6 @@ struct PointProbe {
   }
 };
 
-// Ray-based rendering: the whole segment touches, tip and side. Mesh frame.
-
 // rad, epsilon of equation (2), within which a contact is segment-face: 1 degree, as in the paper.
 inline constexpr double kBlendAngle = std::numbers::pi / 180;
 inline constexpr double kSinBlendAngle = 0.01745240643728351;  // std::sin is not constexpr
@@ -174,7 +172,7 @@ inline Vec3 pressed_window(const stimuli::ConvexMesh& mesh, const WalkResult& hi
   return std::max(0.0, share) * (d - glm::dot(d, hit.normal) * hit.normal);
 }
 
-/// The whole segment.
+/// The whole segment touches, tip and side.
 struct SegmentProbe {
   static constexpr bool kSegment = true;
 

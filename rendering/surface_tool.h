@@ -7,7 +7,9 @@
 #include <cstdint>
 #include <optional>
 
+#include "rendering/active_planes.h"
 #include "rendering/surface_contact.h"
+#include "rendering/surface_state.h"
 #include "rendering/union_state.h"
 
 namespace palpate::rendering {

@@ -22,9 +22,7 @@
 
 namespace palpate::rendering::tick {
 
-// Material forces beyond plain springs: damping and friction.
-
-/// Applies the contact's material to its force.
+/// Applies the contact's material to its force: damping and friction, beyond the plain spring.
 /// \param motion  m, of the probe at the contact since the last tick
 /// \param rate    1/s, ticks; 0 when unknown: no damping
 template <TickFeatures kFeatures>

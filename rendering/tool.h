@@ -25,16 +25,14 @@ struct Tool {
   std::vector<ToolSegment> segments;
 };
 
-// The pose of a tool: the stylus that carries it, with its roll. World frame, m.
-
-/// The stylus and the frame of the tool on it.
+/// The stylus and the frame of the tool on it, with its roll. World frame, m.
 struct ToolPose {
   Vec3 tip;
   Vec3 d;                ///< tail - tip
   Mat3 frame = Mat3(1);  ///< columns: +x (the side), +y, +z (tip to tail); unused without a tool
 };
 
-/// A placed segment of the tool: from tip + from to tip + from + along.
+/// A placed segment of the tool, m: from tip + from to tip + from + along.
 struct PlacedSegment {
   Vec3 from, along;
 };

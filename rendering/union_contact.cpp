@@ -8,6 +8,7 @@
 #include <glm/geometric.hpp>
 #include <span>
 
+#include "rendering/active_planes.h"
 #include "rendering/equivalent_point.h"
 #include "rendering/near_pairs.h"
 #include "rendering/probes.h"

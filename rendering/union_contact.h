@@ -66,11 +66,9 @@ void remember_ideal_tool(UnionTick& tick, std::uint32_t group, const ToolPose& p
 /// Whether the virtual tool is inside of a part of the group.
 bool inside_group(UnionTick& tick, std::uint32_t group);
 
-// When an object lets go of the tool: the trial began inside it, the tool is hooked, or a layer
-// breaks. Forces fade; they do not step. World frame, SI units.
-
-/// s; a released force takes this long to fall to zero: from 6 N, 0.3 N a tick at 1 kHz, less than
-/// the force limiter allows.
+/// s; an object lets go of the tool if the trial began inside it, the tool is hooked, or a layer
+/// breaks. The released force fades instead of stepping, and takes this long to fall to zero: from
+/// 6 N, 0.3 N a tick at 1 kHz, less than the force limiter allows.
 inline constexpr double kFadeTime = 0.02;
 
 /// Call before the ideal tools are followed. Switches off objects that contain the virtual tool at

@@ -13,6 +13,8 @@
 #include <sstream>
 #include <stdexcept>
 
+#include "rendering/bodies/soft/soft_build.h"
+#include "rendering/bodies/soft/soft_object.h"
 #include "rendering/bodies/soft/soft_scene.h"
 #include "rendering/first_contact.h"
 #include "runner/touching_solids.h"

@@ -8,9 +8,10 @@
 #include <vector>
 
 #include "protocols/protocol.h"
+#include "protocols/scene_spec.h"
 #include "protocols/schedule.h"
 #include "rendering/bodies/moving_scene.h"
-#include "rendering/bodies/soft/soft_scene.h"
+#include "rendering/bodies/soft/soft_object.h"
 #include "rendering/renderer.h"
 #include "rendering/scene.h"
 #include "rendering/tool.h"

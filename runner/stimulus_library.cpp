@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "protocols/tasks/levels.h"
+#include "rendering/bodies/soft/soft_build.h"
+#include "rendering/bodies/soft/soft_object.h"
 #include "rendering/bodies/soft/soft_scene.h"
 #include "runner/scene_builder.h"
 #include "runner/sight_bounds.h"

@@ -6,7 +6,7 @@
 #include <glm/common.hpp>
 #include <utility>
 
-#include "rendering/bodies/soft/soft_scene.h"
+#include "rendering/bodies/soft/segment_triangle.h"
 
 namespace palpate::runner {
 namespace {

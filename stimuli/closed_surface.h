@@ -52,15 +52,6 @@ CleanedSurface closed_surface(const PolygonSoup& soup);
 CleanedSurface closed_surface(PolygonSoup&& soup,
                               const std::function<void(const ClosedSurface&)>& meanwhile);
 
-// Merging of points that coincide.
-
-/// For each point the number of the first point at the same place.
-std::vector<std::uint32_t> weld_equal(const std::vector<Vec3>& points);
-
-/// For each point the number of the point that it is welded to (itself, for the first of its
-/// cluster). Points at most `tolerance` (m) apart are one; all coordinates must be finite.
-std::vector<std::uint32_t> weld(const std::vector<Vec3>& points, double tolerance);
-
 /// Pockets, where a surface winds round a place a negative number of times, because it passes
 /// through itself.
 struct Pockets {

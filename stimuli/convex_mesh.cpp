@@ -14,6 +14,7 @@
 
 #include "stimuli/coplanar.h"
 #include "stimuli/face_triangles.h"
+#include "stimuli/facet_outlines.h"
 #include "stimuli/grid_hull.h"
 #include "stimuli/half_edges.h"
 #include "stimuli/inset.h"

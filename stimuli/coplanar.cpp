@@ -16,8 +16,6 @@ namespace {
 
 using Index = HalfEdges::Index;
 
-using Index = std::uint32_t;
-
 PolygonExtent extent_of(const HalfEdges& mesh, Index h) {
   const Index face = mesh.face[h], corners = mesh.first[face + 1] - mesh.first[face];
   // A sample of the corners of a large polygon is enough: all would cost their number squared.
@@ -139,145 +137,6 @@ void renumber(std::vector<Index>& region_of, Index& count) {
   }
 }
 
-class Outliner {
- public:
-  Outliner(const HalfEdges& mesh, const std::vector<Index>& region_of, Index region_count)
-      : mesh_(mesh),
-        region_of_(region_of),
-        borders_at_(mesh.points.size(), 0),
-        border_length_(region_count, 0),
-        begin_(region_count, HalfEdges::kNone),
-        side_at_(mesh.count(), HalfEdges::kNone) {
-    for (Index h = 0; h < mesh.count(); ++h) {
-      if (!is_border(h)) continue;
-      ++borders_at_[mesh.origin[h]];
-      ++border_length_[region_of[mesh.face[h]]];
-    }
-    for (Index h = mesh.count(); h-- > 0;) {
-      if (is_border(h) && is_corner(mesh.origin[h])) begin_[region_of[mesh.face[h]]] = h;
-    }
-  }
-
-  FacetOutlines outlines(MeshFaults& faults) {
-    for (Index region = 0; region < begin_.size(); ++region) trace(region, faults);
-    outlines_.first.push_back(outlines_.side_count());
-    if (!faults.empty()) return std::move(outlines_);
-    for (const Index last : last_) outlines_.opposite.push_back(side_at_[mesh_.twin[last]]);
-    return std::move(outlines_);
-  }
-
- private:
-  bool is_border(Index h) const {
-    return region_of_[mesh_.face[h]] != region_of_[mesh_.face[mesh_.twin[h]]];
-  }
-
-  // Between two regions only, a vertex lies within a straight edge.
-  bool is_corner(Index vertex) const { return borders_at_[vertex] >= 3; }
-
-  Index next_border(Index h) const {
-    h = mesh_.next(h);
-    while (!is_border(h)) h = mesh_.next(mesh_.twin[h]);
-    return h;
-  }
-
-  void trace(Index region, MeshFaults& faults) {
-    outlines_.first.push_back(outlines_.side_count());
-    const Index begin = begin_[region];
-    Index walked = 0;
-    if (begin != HalfEdges::kNone) {
-      Index h = begin;
-      do {
-        if (is_corner(mesh_.origin[h])) {
-          side_at_[h] = outlines_.side_count();
-          outlines_.start.push_back(h);
-          outlines_.region.push_back(region);
-          last_.push_back(h);
-        } else {
-          last_.back() = h;
-        }
-        ++walked;
-        h = next_border(h);
-      } while (h != begin);
-    }
-    if (outlines_.side_count() - outlines_.first.back() < 3) {
-      faults.add("no polygon", [&] {
-        return name(region) +
-               ": expected a facet with at least three corners (is the object flat?)";
-      });
-    } else if (walked != border_length_[region]) {
-      faults.add("hole", [&] {
-        return name(region) + ": expected a facet with one outline, found one with holes";
-      });
-    }
-  }
-
-  std::string name(Index region) const {
-    for (Index f = 0; f < mesh_.face_count(); ++f) {
-      if (region_of_[f] == region) return mesh_.name_face(f);
-    }
-    return "facet";
-  }
-
-  const HalfEdges& mesh_;
-  const std::vector<Index>& region_of_;
-  std::vector<Index> borders_at_;     // of each vertex
-  std::vector<Index> border_length_;  // of each region, in half-edges
-  std::vector<Index> begin_;          // of each region, a border half-edge at a corner
-  std::vector<Index> side_at_;        // of each half-edge that begins a side
-  std::vector<Index> last_;           // of each side, its last half-edge
-  FacetOutlines outlines_;
-};
-
-/// A side of one of several triangles at an edge.
-struct Turned {
-  double angle;  // about the edge
-  bool opens;    // solid begins here as the angle grows
-  SideGroups::Side side;
-};
-
-// Sorted by angle. Solid that begins is paired with the solid that ends, first with first: each
-// pair bounds a wedge of solid, and the wedges are all of the solid at the edge.
-void link_fan(const std::vector<Vec3>& vertices, const std::vector<std::array<Index, 3>>& triangles,
-              const SideGroups::Edge& edge, std::vector<std::array<Index, 3>>& across) {
-  const Vec3 from = vertices[edge.low], along = glm::normalize(vertices[edge.high] - from);
-  Vec3 x(0);
-  std::vector<Turned> fan;
-  for (const SideGroups::Side& side : edge.sides) {
-    Vec3 away = vertices[triangles[side.triangle()][(side.k() + 2) % 3]] - from;
-    away -= glm::dot(away, along) * along;
-    if (x == Vec3(0)) x = away;
-    const double angle = std::atan2(glm::dot(glm::cross(along, x), away), glm::dot(x, away));
-    fan.push_back({angle, !side.up(), side});
-  }
-  std::sort(fan.begin(), fan.end(), [](const Turned& a, const Turned& b) {
-    if (a.angle != b.angle) return a.angle < b.angle;
-    return a.opens != b.opens ? a.opens : a.side.code < b.side.code;
-  });
-  // Begin where fewest are open.
-  int open = 0, fewest = 0;
-  std::size_t begin = 0;
-  for (std::size_t i = 0; i < fan.size(); ++i) {
-    open += fan[i].opens ? 1 : -1;
-    if (open < fewest) {
-      fewest = open;
-      begin = i + 1;
-    }
-  }
-  std::rotate(fan.begin(), fan.begin() + static_cast<std::ptrdiff_t>(begin % fan.size()),
-              fan.end());
-  std::vector<SideGroups::Side> opened;
-  std::size_t next = 0;
-  for (const Turned& turned : fan) {
-    if (turned.opens) {
-      opened.push_back(turned.side);
-      continue;
-    }
-    const SideGroups::Side a = opened[next++], b = turned.side;
-    across[a.triangle()][a.k()] = b.triangle();
-    across[b.triangle()][b.k()] = a.triangle();
-  }
-}
-
 }  // namespace
 
 std::vector<FaceShape> shapes_of(const HalfEdges& mesh) {
@@ -355,51 +214,6 @@ std::vector<Index> single_regions(const HalfEdges& mesh, const std::vector<FaceS
   assign_thin_faces(mesh, std::move(thin), region_of);
   renumber(region_of, count);
   return region_of;
-}
-
-FacetOutlines facet_outlines(const HalfEdges& mesh, const std::vector<Index>& region_of,
-                             Index region_count, MeshFaults& faults) {
-  return Outliner(mesh, region_of, region_count).outlines(faults);
-}
-
-SideGroups::SideGroups(std::size_t vertex_count, const std::vector<std::array<Index, 3>>& triangles)
-    : first_(vertex_count + 1, 0), sides_(3 * triangles.size()) {
-  for (const auto& t : triangles) {
-    for (std::size_t k = 0; k < 3; ++k) ++first_[std::min(t[k], t[(k + 1) % 3])];
-  }
-  Index sum = 0;
-  for (Index& first : first_) {
-    sum += first;
-    first = sum;
-  }
-  for (auto i = static_cast<Index>(triangles.size()); i-- > 0;) {
-    const auto& t = triangles[i];
-    for (Index k = 3; k-- > 0;) {
-      const Index a = t[k], b = t[(k + 1) % 3];
-      sides_[--first_[std::min(a, b)]] = {std::max(a, b), 6 * i + 2 * k + (a < b ? 1U : 0U)};
-    }
-  }
-  for (std::size_t v = 0; v < vertex_count; ++v) {
-    std::sort(sides_.begin() + first_[v], sides_.begin() + first_[v + 1],
-              [](const Side& a, const Side& b) {
-                return a.other != b.other ? a.other < b.other : a.code < b.code;
-              });
-  }
-}
-
-void link_triangles(const std::vector<Vec3>& vertices,
-                    const std::vector<std::array<Index, 3>>& triangles,
-                    std::vector<std::array<Index, 3>>& across) {
-  across.assign(triangles.size(), {});
-  SideGroups(vertices.size(), triangles).for_each_edge([&](const SideGroups::Edge& edge) {
-    if (edge.sides.size() > 2) {
-      link_fan(vertices, triangles, edge, across);
-      return;
-    }
-    const SideGroups::Side a = edge.sides[0], b = edge.sides[1];
-    across[a.triangle()][a.k()] = b.triangle();
-    across[b.triangle()][b.k()] = a.triangle();
-  });
 }
 
 }  // namespace palpate::stimuli

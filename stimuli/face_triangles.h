@@ -11,9 +11,7 @@
 
 namespace palpate::stimuli {
 
-// Plane, area and diameter of a polygon.
-
-/// Of a plane polygon, counter-clockwise seen from outside.
+/// Plane, area and diameter of a plane polygon, counter-clockwise seen from outside.
 struct PolygonPlane {
   Vec3 normal;          ///< unit, outward; zero for a polygon without area
   Vec3 middle;          ///< m, mean of the corners
@@ -23,8 +21,6 @@ struct PolygonPlane {
 
 /// As exact as the corners allow, also for polygons a million times longer than wide.
 PolygonPlane plane_of(std::span<const Vec3> corners);
-
-// Triangles without area in a closed surface.
 
 /// The results of collapse_flat_triangles.
 struct Flattened {

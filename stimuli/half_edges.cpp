@@ -8,9 +8,9 @@
 #include <limits>
 #include <numeric>
 
-#include "stimuli/closed_surface.h"
 #include "stimuli/mesh_names.h"
 #include "stimuli/polygon_soup.h"
+#include "stimuli/weld.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -1,5 +1,6 @@
 #pragma once
-// The surface of a body moved inwards. The mesh's own frame, SI units.
+// The surface of a body, or of a solid of several convex parts, moved inwards. The mesh's own
+// frame, one for all parts. SI units.
 
 #include <memory>
 #include <vector>
@@ -37,8 +38,6 @@ Ball largest_inscribed_ball(const ConvexMesh& mesh);
 /// ball has a radius of at most `depth`. \throws MeshError where the rest is too thin to
 /// distinguish from a plane.
 std::shared_ptr<const ConvexMesh> inset(const ConvexMesh& mesh, double depth);
-
-// The same of a solid of several convex parts. One frame for all parts.
 
 /// Greatest depth of a concave solid's layer, relative to the nominal depth. The exact layer is
 /// round about concave edges and corners; this one has facets there.

@@ -15,6 +15,7 @@
 #include <string_view>
 #include <vector>
 
+#include "data/base/base64.h"
 #include "data/base/input_file.h"
 #include "data/base/json_text.h"
 #include "data/base/text.h"

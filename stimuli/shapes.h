@@ -1,7 +1,8 @@
 #pragma once
-// The parameters of each shape, in one table. Every other function that distinguishes shapes is a
-// switch without `default:`, so that the compiler (-Wswitch) reports those that lack a new shape.
-// How to add one: README.md.
+// An object as a scene file or protocol describes it, as plain values (the keys:
+// protocols/scene.schema.json), and the parameters of each shape, in one table. Every other
+// function that distinguishes shapes is a switch without `default:`, so that the compiler
+// (-Wswitch) reports those that lack a new shape. How to add one: README.md. SI units.
 
 #include <array>
 #include <cstddef>
@@ -15,9 +16,6 @@
 #include "stimuli/vec.h"
 
 namespace palpate::stimuli {
-
-// An object as a scene file or protocol describes it, as plain values (the keys:
-// protocols/scene.schema.json). SI units.
 
 enum class ShapeKind {
   sphere,

@@ -111,27 +111,27 @@ LOOKS_INSIDE = {"runner/evidence/accuracy", "runner/evidence/scenes", "runner/ev
 # The headers of a room that other rooms use; all others are the room's own business (and that of the rooms within).
 PUBLIC = {
     "stimuli": "closed_surface face_triangles shapes convex_mesh grid_hull inset large_array layers/layer_surface mesh_file nearest_on_triangle orientation polygon_soup "
-               " parts/convex_parts primitives solids/solid_mesh texture vec",
-    "rendering": "fields first_contact probe reach render_fault renderer scene tool",
+               " parts/convex_parts primitives signed_distance solids/gmsh_file solids/solid_mesh texture vec",
+    "rendering": "fields first_contact probe reach render_fault renderer scene scene_motion tool",
     "rendering/bodies": "moving_scene",
-    "runner/evidence/verification": "explain extreme_cases random_solids reference search surface_reference union_cases",
+    "runner/evidence/verification": "explain extreme_cases random_draws random_solids reference search surface_reference surface_stroke union_cases union_search",
     "runner/evidence/scenes": "feature_costs scene_study stage_costs tick_costs",
     "runner/evidence/accuracy": "body_study methods paper_first_contact peers study union_study",
-    "rendering/bodies/soft": "soft_scene",
-    "protocols": "answer_keys difference factors groups json_document parse protocol schedule session_plan sight sound sweep_space "
+    "rendering/bodies/soft": "segment_triangle soft_build soft_contact soft_object soft_scene",
+    "protocols": "answer_keys difference event_codes factors fault_list groups json_document object_reader parse protocol scene_spec schedule session_plan sight sound sweep_space "
                  "tasks/block_order tasks/block_procedures tasks/levels tasks/texts",
     "protocols/procedures": "procedure procedure_spec psychometric recovery",
-    "data/base": "cell_name checksum column_names group_assignment input_file json_text markdown random sobol text words",
+    "data/base": "base64 cell_name checksum column_names group_assignment input_file json_text markdown random sobol text utf8 words",
     "data": "column_table record stored_protocol sweep_record",
     "data/files": "atomic_file atomic_folder file_permissions text_sink output_check utc",
-    "data/store": "export_log frames unmaskings participant_columns participant_groups protocol_rows schema connection station_database store sweep_file "
+    "data/store": "export_log frames unmaskings participant_columns participant_groups protocol_rows schema statement station_database store store_error sweep_file "
                   "forget task_text",
-    "data/export": "csv datasets sample_slots settings study_about delimited_row",
+    "data/export": "csv datasets sample_slots settings study_about trial_table",
     "data/merge": "merge",
     "analysis": "text",
     "analysis/input": "csv_reader trials study_record study_table sweep_table",
     "analysis/statistics": "analysis answer_model comparison conclusions cue_plan cue_study cues describe group_power group_simulation interval_coverage jobs mixed_model "
-                           "paired paired_evidence pattern power plan quantiles sensitivity sequential_looks "
+                           "paired paired_evidence pattern pilot power plan quantiles sensitivity sequential_looks "
                            "study_design sweep_analysis task_analysis threshold_plan",
     "analysis/movement": "comparison measures pictures",
     "analysis/figures": "panel_drawing figures svg",
@@ -142,14 +142,14 @@ PUBLIC = {
     "runner/safety": "fault_signals guarded_device shared_memory",
     "runner/sound": "loopback player sound_output sound_source",
     "runner/devices": "device_delay mouse registry self_test simulated",
-    "runner/devices/falcon": "calibration falcon stylus_from_ends",
+    "runner/devices/falcon": "calibration driver falcon stylus_from_ends",
     "runner/display": "display explore_window mailbox seen text_display timeline window",
     "runner/display/scene": "camera gl_objects picture drawn_mesh image_file painter scene_drawing "
                             "scene_renderer",
     "runner/participants": "keyboard reacher respondent response_box seen_record seen_trial simulated_settings simulated "
                            "task_participant",
     "runner/session": "device_check effect_check live_forces live_session markers recorded_outcome sample_stream session_scenes signals "
-                      "preflight run_record replay session session_end simulated_study "
+                      "preflight recorded_trial replay replay_comparison run_record session session_end simulated_study "
                       "socket_advisor station",
     "runner/output": "outputs progress_line",
     "runner/station": "admission lag_check opening protocol_check protocol_choice run_settings servo_timing sound_timing",
@@ -161,7 +161,7 @@ PUBLIC = {
     "runner/serve": "loopback network page_server served_scene served_session",
     "runner/design": "design_page protocol_file rehearsal",
     "runner/sweep": "cluster_folder cluster_job planned_sweep slurm",
-    "runner/evidence/stability": "boundary effect_stability scene_boundary",
+    "runner/evidence/stability": "boundary effect_stability integrators scene_boundary soft_rest",
     "runner/evidence": "",
     "runner/commands": "shared/command",
 }

@@ -1,5 +1,7 @@
 #pragma once
-// One panel of a figure as SVG: axes and marks. Internal to analysis/figures/.
+// Panels of a figure as SVG, axes (range, ticks and tick labels) and marks, and the common parts of
+// the figures of an analysis: title and label, style and legend of renderers, numbers of shapes,
+// renderers and comparisons drawn, empty panels, and the functions that make each figure.
 
 #include <cstddef>
 #include <string>
@@ -11,8 +13,6 @@
 #include "analysis/figures/svg.h"
 
 namespace palpate::analysis {
-
-// Axes of panels: range, ticks and tick labels.
 
 /// Categorical axis: slot i spans i to i + 1 and has its name in the middle. \param shown number of
 /// names shown
@@ -27,8 +27,7 @@ FigureAxis log_axis(double low, double high, std::string title);
 /// The same with ends at whole powers of ten. \param low, high values, above 0
 FigureAxis decades_axis(double low, double high, std::string title);
 
-// Constructors of marks. Coordinates in the units of the axes, sizes in px.
-
+/// Marks. Coordinates in the units of the axes, sizes in px.
 Mark symbol(Role role, MarkerShape shape, double x, double y, double size, std::string text = {});
 Mark text_mark(Role role, double x, double y, std::string text, double size = 12);
 Mark line_mark(Role role, std::vector<double> x, std::vector<double> y, double width = 2);
@@ -49,10 +48,6 @@ std::vector<std::pair<double, double>> outline_of(MarkerShape shape);
 /// candidate position (right or left, several heights) that overlaps the fewest points, intervals,
 /// lines and labels placed before. \param width px, of the panel as it is drawn
 std::vector<Mark> placed_labels(const Panel& panel, double width);
-
-// Common parts of the figures of an analysis: title and label, style and legend of renderers,
-// numbers of shapes, renderers and comparisons drawn, empty panels, and the functions that make
-// each figure. Internal to analysis/figures/.
 
 /// px: width of the only panel of a row, and of the panel of one comparison among several.
 constexpr double kFullPanelWidth = 850, kComparisonPanelWidth = 370;

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "analysis/text.h"
-#include "data/base/text.h"
+#include "data/base/utf8.h"
 
 namespace palpate::analysis {
 

@@ -1,5 +1,5 @@
 #pragma once
-// Writes SVG 1.1 text: the elements that figures need.
+// Writes SVG 1.1 text: colours, the elements that figures need, and whole figures.
 
 #include <array>
 #include <cstddef>
@@ -12,9 +12,7 @@
 
 namespace palpate::analysis {
 
-// Colours of figures and pages by role.
-
-/// CSS colours, indexed by Role.
+/// CSS colours of figures and pages, indexed by Role.
 using Palette = std::array<std::string, kRoles>;
 
 /// For print and light pages: the colours of Okabe & Ito (2008), distinguishable with colour vision
@@ -88,8 +86,6 @@ std::string fitting(std::string_view text, double width, double size);
 /// The text in lines of at most `width` px.
 std::vector<std::string> lines_of(std::string_view text, double width, double size,
                                   bool bold = false);
-
-// A whole figure.
 
 /// standalone: a separate file, with title and notes; in_page: the HTML page shows title and notes;
 /// in_narrow_page: the same for narrow screens, with narrower panels stacked vertically.

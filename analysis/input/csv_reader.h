@@ -12,9 +12,7 @@
 
 namespace palpate::analysis {
 
-// Unknown columns of a table that resemble a known one: "Level" for "level".
-
-/// A column of a table, and the missing one that is probably meant.
+/// An unknown column of a table, and the missing one that is probably meant: "Level", "level".
 struct AlikeColumn {
   std::string found, meant;
 };

@@ -18,9 +18,8 @@ class Store;
 
 namespace palpate::analysis {
 
-// Number of trials in which the renderer's torque was left out, because the device drives force
-// alone.
-
+/// Counts the trials in which the renderer's torque was left out, because the device drives force
+/// alone.
 class TorqueCounts {
  public:
   /// \param driven  missing: unknown, or the renderer gives none

@@ -21,8 +21,6 @@ class Store;
 
 namespace palpate::analysis {
 
-// Pairs of renderers to compare, and their names in sentences.
-
 /// A renderer and its reference; all differences are `renderer` minus `reference`.
 struct RendererPair {
   std::string reference, renderer;
@@ -114,8 +112,6 @@ TrialTable read_trials_store(data::Store& store, const std::string& protocol = "
 
 /// Number of faults listed; further ones are counted.
 constexpr std::size_t kMaxFaults = 50;
-
-// Builds a TrialTable from the rows of any source.
 
 /// Missing values as R, pandas, BIDS and spreadsheets write them; a name may be NA.
 bool is_missing(std::string_view text);

@@ -44,10 +44,8 @@ struct MeasureComparison {
 /// measures.
 std::vector<MeasureComparison> compare_movement(const MovementTable& table);
 
-// Association of the gain in time with differences of movement. Not causal: the movements were not
-// manipulated.
-
-/// For one shape, one pair of renderers and one measure. Log times are compared within
+/// Association of the gain in time with differences of movement. Not causal: the movements were not
+/// manipulated. For one shape, one pair of renderers and one measure. Log times are compared within
 /// participants: each participant's mean is subtracted from time, renderer and measure.
 struct AdjustedGain {
   std::size_t shape = 0, comparison = 0, measure = 0;

@@ -13,9 +13,6 @@
 
 namespace palpate::analysis {
 
-// Actions in contact: episodes, stops, strokes, and exploratory procedures (Lederman & Klatzky
-// 1987; classified by position and force as in Jansen et al. 2013).
-
 /// Contact episodes: gaps under 50 ms are joined, then episodes under 20 ms dropped.
 std::vector<Stretch> contact_episodes(const std::vector<bool>& contact, double rate);
 
@@ -29,6 +26,8 @@ std::vector<Stretch> stops(const std::vector<bool>& contact, const std::vector<d
 std::size_t strokes(const std::vector<bool>& contact, const std::vector<Stretch>& stops,
                     const std::vector<Vec3>& path, double rate);
 
+/// Exploratory procedures (Lederman & Klatzky 1987), classified by position and force as in Jansen
+/// et al. 2013.
 enum class Procedure { stationary, pressure, lateral, contour };
 inline constexpr std::size_t kProcedures = 4;
 

@@ -1,5 +1,6 @@
 #pragma once
-// Preprocessing of a hand's path: low-pass filter and differences. Units of the caller.
+// Preprocessing of a hand's path (low-pass filter, differences), smoothness, movements and peaks of
+// speed. Units of the caller.
 
 #include <cstddef>
 #include <optional>
@@ -38,16 +39,14 @@ std::vector<T> part_of(const std::vector<T>& all, const Stretch& stretch) {
           all.begin() + static_cast<std::ptrdiff_t>(stretch.end)};
 }
 
-// Smoothness of movement: spectral arc length and dimensionless jerk (Balasubramanian et al. 2015,
-// J. NeuroEng. Rehab., 10.1186/s12984-015-0090-9), movements, peaks of speed.
-
-/// Spectral arc length of a speed profile: zero padding to 2^(ceil log2 N + 4), up to the highest
-/// frequency below 10 Hz with at least 0.05 of the spectrum's maximum. None: no speed.
+/// Smoothness of movement: spectral arc length of a speed profile (Balasubramanian et al. 2015, J.
+/// NeuroEng. Rehab., 10.1186/s12984-015-0090-9). Zero padding to 2^(ceil log2 N + 4), up to the
+/// highest frequency below 10 Hz with at least 0.05 of the spectrum's maximum. None: no speed.
 /// \param speed  not negative, so that the spectrum is maximal at 0 Hz. \param rate  Hz
 std::optional<double> sparc(const std::vector<double>& speed, double rate);
 
-/// - ln(T^3 / v_max^2 x integral of the vector jerk's square), their table 3. None: too short, or
-/// no speed or jerk.
+/// Dimensionless jerk: - ln(T^3 / v_max^2 x integral of the vector jerk's square), table 3 of the
+/// same paper. None: too short, or no speed or jerk.
 /// \param path  of one movement
 std::optional<double> log_dimensionless_jerk(const std::vector<Vec3>& path, double rate);
 /// As in the authors' program: with the second difference of speed in place of the vector jerk.

@@ -10,12 +10,9 @@
 
 namespace palpate::analysis {
 
-// report.css and report.js, embedded by the build (report_assets.cmake).
-
+/// report.css and report.js, embedded by the build (report_assets.cmake).
 std::string_view report_style();
 std::string_view report_script();
-
-// HTML of sentences and tables, and the hash of a script for a content security policy.
 
 /// Escaped text with no-break spaces before percent signs.
 std::string escaped_sentence(std::string_view text);

@@ -62,8 +62,7 @@ Table provenance_table(const Analysis& analysis);
 /// All of them in the order of display.
 std::vector<Table> all_tables(const Analysis& analysis);
 
-// Numbers as text of table cells; a dash for a missing or non-finite one.
-
+/// The cell of a missing or non-finite number.
 inline constexpr const char* kMissing = "–";
 
 std::string number(const std::optional<double>& value, int decimals);

@@ -14,11 +14,10 @@
 #include "analysis/statistics/describe.h"
 #include "analysis/statistics/mixed_model.h"
 #include "analysis/statistics/paired.h"
+#include "analysis/statistics/rm_anova.h"
 #include "analysis/statistics/shape_slope_model.h"
 
 namespace palpate::analysis {
-
-// Effects of practice on the gain: learning over trials, and order of the renderers.
 
 /// Number of bins of equal length into which a participant's trials with a renderer are divided, in
 /// order.

@@ -14,10 +14,8 @@
 
 namespace palpate::analysis {
 
-// Trials that ended at the time limit, by cell and participant. Their times are right-censored at
-// the limit.
-
-/// Time-outs of one participant in one cell with the same limit.
+/// Trials of one participant in one cell that ended at the same time limit, at which their times
+/// are right-censored.
 struct TimeOutGroup {
   std::uint32_t participant = 0;
   double limit = 0;  ///< s; unknown if not finite or not above 0

@@ -18,9 +18,8 @@
 
 namespace palpate::analysis {
 
-// Results of Ho, Basdogan & Srinivasan (2000), fig. 15.
-
-/// Percent reduction of the mean time to identify a shape with the ray, compared with the point.
+/// Percent reduction of the mean time to identify a shape with the ray, compared with the point:
+/// Ho, Basdogan & Srinivasan (2000), fig. 15.
 struct PaperEffect {
   std::string_view shape;
   std::optional<double> percent_reduction;  ///< none: the difference was not significant
@@ -35,9 +34,8 @@ constexpr const PaperEffect* find_paper_effect(std::string_view shape) {
   return found == kPaperEffects.end() ? nullptr : found;
 }
 
-// Speed-accuracy trade-off: change of accuracy and change of time.
-
-/// Changes of one shape, renderer minus reference. Accuracies are proportions, 0 to 1.
+/// Speed-accuracy trade-off: changes of accuracy and time of one shape, renderer minus reference.
+/// Accuracies are proportions, 0 to 1.
 struct SpeedAccuracy {
   std::optional<double> percent_change_time;  ///< of the geometric mean; negative: faster
   std::optional<double> accuracy_reference, accuracy_renderer;  ///< means over participants

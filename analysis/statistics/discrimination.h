@@ -1,4 +1,6 @@
 #pragma once
+// Figures of fitted functions (PSE, JND, Weber fraction), sensitivity and criterion of yes/no,
+// two-interval and same/different tasks, and confidence.
 
 #include <optional>
 #include <string>
@@ -25,8 +27,6 @@ struct Discrimination {
 Discrimination discrimination(const PsychometricFit& fit,
                               const protocols::PsychometricFunction& function,
                               std::optional<double> standard);
-
-// Sensitivity and criterion of yes/no, two-interval and same/different tasks, and confidence.
 
 /// Counts of answers "yes" (or "different", or "the second") with and without a signal.
 struct DetectionCounts {

@@ -64,27 +64,6 @@ struct Power {
 Power simulate_power(const StudyModel& model, const StudyDesign& design,
                      const PowerSettings& settings);
 
-// Estimates the model for sample size planning from a pilot study.
-
-/// Estimates from a pilot.
-struct Pilot {
-  RendererPair pair;      ///< the first comparison of the pilot
-  std::string undefined;  ///< reason if there is no model; empty: there is one
-  StudyModel model;       ///< effects as estimated in the pilot
-  std::string label;      ///< from simulated_label(); empty: human participants
-  std::vector<std::string> notes;
-};
-
-/// The parameters of the fitted mixed model, and the participant x shape standard deviation of
-/// gains, which that model lacks: by moments from the mean differences of participants with all
-/// cells (0 if residual variance explains them). If it is above 0, it is subtracted from the
-/// variance of the random slope, which contains a part of it, and the residual variance is that
-/// within cells.
-Pilot read_pilot(const Analysis& analysis);
-
-// Single trials from the same model, in the order of a schedule: simulated data with the planned
-// effect, or with none.
-
 struct ModelTrial {
   std::size_t shape = 0;       ///< index into StudyModel::shapes
   bool with_renderer = false;  ///< the renderer with the planned effect; false: the reference
@@ -96,7 +75,8 @@ struct ModelAnswer {
   double time = 0;        ///< s
 };
 
-/// The trials of one participant; intercept and gains are drawn first.
+/// Single trials of one participant from the same model, in the order of a schedule: simulated data
+/// with the planned effect, or with none (without_effect). Intercept and gains are drawn first.
 /// \param typical_time  s, geometric mean over participants with the reference; the model has none
 std::vector<ModelAnswer> draw_answers(const StudyModel& model, double typical_time,
                                       const std::vector<ModelTrial>& trials, Random& random);

@@ -64,9 +64,6 @@ struct RemlOptimum {
 /// \param coding  levels x effects, of full column rank: Psi = coding Lambda Lambda' coding'
 RemlOptimum reml_optimum(const RemlStatistics& data, const Eigen::MatrixXd& coding);
 
-// Reduces participants' cells to the sufficient statistics of the REML criterion, with as few
-// columns of X as possible.
-
 /// The non-empty cells of renderer x shape. Their indicators are the columns of X: any full-rank
 /// coding spans the same.
 struct ModelCells {
@@ -86,7 +83,8 @@ struct CellDirections {
   Eigen::MatrixXd directions;     ///< cells x columns, orthonormal
 };
 
-/// The model reduced to the part that depends on Psi.
+/// Participants' cells reduced to the sufficient statistics of the REML criterion, with as few
+/// columns of X as possible: the part of the model that depends on Psi.
 ///
 /// With D the diagonal matrix of trials by cell, X'V^-1X = D - sum of one rank-1 matrix for each
 /// participant and renderer: only components of the cell means in the span of these directions

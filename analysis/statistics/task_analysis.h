@@ -24,9 +24,7 @@
 
 namespace palpate::analysis {
 
-// Magnitude estimation and the method of adjustment.
-
-/// One judgement of a participant.
+/// One judgement of a participant in magnitude estimation.
 struct MagnitudeTrial {
   std::size_t participant = 0;
   double level = 0;      ///< of the stimulus, > 0
@@ -72,7 +70,7 @@ struct MagnitudeEstimation {
 /// \param modulus  the experimenter gave the number of a standard
 MagnitudeEstimation magnitude_estimation(const std::vector<MagnitudeTrial>& trials, bool modulus);
 
-/// One setting of a level to equal a standard.
+/// One setting of a level to equal a standard, by the method of adjustment.
 struct AdjustmentTrial {
   std::size_t participant = 0;
   double standard = 0, setting = 0;
@@ -112,8 +110,6 @@ struct InformationTransfer {
 
 /// \param counts  [stimulus][answer]; excludes trials without an answer
 InformationTransfer information_transfer(const std::vector<std::vector<std::size_t>>& counts);
-
-// The tracks of a procedure over the trials, and its own estimate.
 
 /// An adaptive procedure at the end of a track.
 struct TrackProcedure {

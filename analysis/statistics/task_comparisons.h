@@ -1,7 +1,7 @@
 #pragma once
-// Thresholds, JNDs, exponents and settings over participants: means, and comparisons within
-// participants between renderers, or between blocks and stimuli of a task. Paired tests and mixed
-// models.
+// Thresholds, PSEs, JNDs, slopes, exponents and settings over participants: means, and comparisons
+// within participants between renderers, or between blocks and stimuli of a task. Paired tests and
+// mixed models.
 
 #include <cstddef>
 #include <optional>
@@ -11,8 +11,6 @@
 #include "analysis/statistics/paired.h"
 
 namespace palpate::analysis {
-
-// Thresholds (or PSEs, JNDs, slopes) of the same participants under several conditions.
 
 /// A figure of a participant under a condition, on the scale of the comparison: logarithms for
 /// ratios.

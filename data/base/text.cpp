@@ -6,11 +6,10 @@
 #include <cstdio>
 #include <vector>
 
+#include "data/base/utf8.h"
+
 namespace palpate {
 namespace {
-
-constexpr std::string_view kDigits =
-    "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
 bool is_plain(const Character& c) {
   const auto within = [&](std::uint32_t least, std::uint32_t most) {
@@ -59,38 +58,6 @@ std::string shown(std::string_view text, std::size_t max_bytes, bool lines) {
 
 }  // namespace
 
-std::string base64_encoded(std::string_view bytes) {
-  std::string text;
-  text.reserve((bytes.size() + 2) / 3 * 4);
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    std::uint32_t word = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      word = word << 8U | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
-    for (std::size_t k = 0; k < 4; ++k)
-      text += i + k > bytes.size() ? '=' : kDigits[word >> (18 - 6 * k) & 63U];
-  }
-  return text;
-}
-
-std::optional<std::string> base64_decoded(std::string_view text) {
-  while (!text.empty() && text.back() == '=') text.remove_suffix(1);
-  if (text.size() % 4 == 1) return std::nullopt;
-  std::string bytes;
-  bytes.reserve(text.size() / 4 * 3 + 3);
-  std::uint32_t word = 0;
-  int bits = 0;
-  for (const char c : text) {
-    const std::size_t digit = kDigits.find(c);
-    if (digit == std::string_view::npos) return std::nullopt;
-    word = word << 6U | static_cast<std::uint32_t>(digit);
-    bits += 6;
-    if (bits < 8) continue;
-    bits -= 8;
-    bytes += static_cast<char>(word >> bits & 255U);
-  }
-  return bytes;
-}
-
 std::size_t edit_distance(std::string_view a, std::string_view b) {
   std::vector<std::size_t> row(b.size() + 1);  // to the first j bytes of b
   for (std::size_t j = 0; j <= b.size(); ++j) row[j] = j;
@@ -124,49 +91,6 @@ std::string nearest_word(std::string_view word, const std::vector<std::string>& 
     nearest = one;
   }
   return nearest;
-}
-
-Character first_character(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return static_cast<std::uint8_t>(text[i]); };
-  const std::uint32_t lead = byte(0);
-  const std::size_t size = utf8_size(text[0]);
-  if (size == 0 || text.size() < size) return {};
-  std::uint32_t code = size == 1 ? lead : lead & (0xFFU >> (size + 1));
-  for (std::size_t i = 1; i < size; ++i) {
-    if (!continues_character(text[i])) return {};
-    code = code << 6 | (byte(i) & 0x3FU);
-  }
-  const bool overlong = (size == 3 && code < 0x800) || (size == 4 && code < 0x10000);
-  const bool surrogate = code >= 0xD800 && code <= 0xDFFF;
-  if (overlong || surrogate || code > 0x10FFFF) return {};
-  return {code, size, true};
-}
-
-std::size_t utf8_size(char lead) {
-  const auto byte = static_cast<std::uint8_t>(lead);
-  if (byte < 0x80) return 1;
-  if (byte < 0xC2 || byte > 0xF4) return 0;
-  return byte >= 0xF0 ? 4 : byte >= 0xE0 ? 3 : 2;
-}
-
-std::size_t count_characters(std::string_view text) {
-  return static_cast<std::size_t>(
-      std::count_if(text.begin(), text.end(), [](char c) { return !continues_character(c); }));
-}
-
-void remove_last_character(std::string& text) {
-  while (!text.empty() && continues_character(text.back())) text.pop_back();
-  if (!text.empty()) text.pop_back();
-}
-
-std::string utf8(std::uint32_t code) {
-  const auto tail = [code](unsigned shift) {
-    return static_cast<char>(0x80U | (code >> shift & 0x3FU));
-  };
-  if (code < 0x80) return {static_cast<char>(code)};
-  if (code < 0x800) return {static_cast<char>(0xC0U | code >> 6U), tail(0)};
-  if (code < 0x10000) return {static_cast<char>(0xE0U | code >> 12U), tail(6), tail(0)};
-  return {static_cast<char>(0xF0U | (code >> 18U & 7U)), tail(12), tail(6), tail(0)};
 }
 
 bool is_plain_utf8(std::string_view text) {

@@ -13,10 +13,13 @@
 
 #include "data/base/markdown.h"
 #include "data/export/bids_recording.h"
+#include "data/export/column_values.h"
 #include "data/export/dataset_description.h"
 #include "data/export/datasets.h"
 #include "data/export/delimited_row.h"
 #include "data/export/derived_table.h"
+#include "data/export/exported_columns.h"
+#include "data/export/page_table.h"
 #include "data/export/sample_slots.h"
 #include "data/files/text_sink.h"
 #include "data/files/utc.h"

@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "data/base/json_text.h"
+#include "data/export/column_values.h"
+#include "data/export/delimited_row.h"
 #include "data/export/sample_slots.h"
 #include "data/files/utc.h"
 

@@ -7,8 +7,11 @@
 #include <optional>
 #include <system_error>
 
+#include "data/export/column_values.h"
 #include "data/export/dataset_description.h"
 #include "data/export/delimited_row.h"
+#include "data/export/exported_columns.h"
+#include "data/export/page_table.h"
 #include "data/files/atomic_file.h"
 #include "data/files/output_check.h"
 #include "data/files/text_sink.h"

@@ -16,9 +16,8 @@
 
 namespace palpate::data {
 
-// Internal to data/export: the table of attempts that were cut off, common to all formats.
-
-/// RFC 4180 with a header. \return rows
+/// The table of attempts that were cut off, common to all formats: RFC 4180 with a header.
+/// \return rows
 std::int64_t write_attempts(Store& store, TextSink& out, const ExportClock& clock,
                             ExportedParticipants& participants, ProgressCounter& counter);
 
@@ -27,8 +26,8 @@ std::int64_t write_attempts(Store& store, TextSink& out, const ExportClock& cloc
 /// trials.csv these are attempts.csv and pages.csv. UTF-8 without BOM, RFC 4180 (lines end in CRLF,
 /// fields quoted only where needed), numbers as the shortest text that reads back exactly; texts
 /// that a spreadsheet would evaluate are guarded (text_sink.h). settings.codebook names a file for
-/// the meaning of the columns. Columns: delimited_row.h. Each file appears complete or not at all
-/// (atomic_file.h), and the database records the export.
+/// the meaning of the columns. Columns: exported_columns.h. Each file appears complete or not at
+/// all (atomic_file.h), and the database records the export.
 ///
 /// \throws StoreRefused: a file exists and `force` is not given, or `path` must not be written to;
 /// StoreError: it could not be written. No file is left behind then.

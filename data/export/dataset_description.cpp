@@ -6,7 +6,8 @@
 #include <string_view>
 
 #include "data/base/words.h"
-#include "data/export/delimited_row.h"
+#include "data/export/exported_columns.h"
+#include "data/export/page_table.h"
 #include "data/files/text_sink.h"
 
 namespace palpate::data {

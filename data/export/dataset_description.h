@@ -1,6 +1,6 @@
 #pragma once
-// Internal to data/export: the texts and JSON with which dataset folders describe themselves:
-// labels of protocols, names, columns.
+// Folders of a dataset, and the texts and JSON with which they describe themselves: labels of
+// protocols, names, columns.
 
 #include <cstdint>
 #include <map>
@@ -12,7 +12,8 @@
 
 #include "data/export/clock.h"
 #include "data/export/csv.h"
-#include "data/export/delimited_row.h"
+#include "data/export/exported_columns.h"
+#include "data/export/page_table.h"
 #include "data/export/settings.h"
 #include "data/files/atomic_folder.h"
 #include "data/files/text_sink.h"
@@ -84,15 +85,13 @@ inline constexpr const char* kGuardSentence =
 /// JSON as the text of a file. Invalid UTF-8 is replaced.
 std::string json_text(const nlohmann::ordered_json& json);
 
-/// Internal to data/export: the codebook of trials.csv and attempts.csv (csv.h), with its header.
+/// The codebook of trials.csv and attempts.csv (csv.h), with its header.
 std::vector<CodebookRow> codebook_rows(const ProtocolFacts& facts, const ExportSettings& settings,
                                        const ExportClock& clock);
 
-// Internal to data/export: the common part of BIDS and Psych-DS: a folder of tables that appears
-// complete or not at all and is recorded in the database.
-
-/// Writes the files of one dataset. Each format derives from it and chooses its files; it also has
-/// a static has_file(name): whether its exports contain such a file.
+/// Writes the files of one dataset: the common part of BIDS and Psych-DS, a folder of tables that
+/// appears complete or not at all and is recorded in the database. Each format derives from it and
+/// chooses its files; it also has a static has_file(name): whether its exports contain such a file.
 class DatasetWriter {
  public:
   DatasetWriter(Store& store, const std::string& path, const ExportSettings& settings,

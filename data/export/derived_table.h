@@ -7,6 +7,7 @@
 
 #include "data/export/dataset_description.h"
 #include "data/export/delimited_row.h"
+#include "data/export/exported_columns.h"
 #include "data/export/settings.h"
 #include "data/files/text_sink.h"
 #include "data/store/store.h"

@@ -9,13 +9,12 @@
 
 namespace palpate::data {
 
-// Names of temporary files and folders, and removal of those that killed processes left.
-
-/// ".NAME.palpate-" in the folder of the target; six random characters follow.
+/// How names of temporary files and folders begin: ".NAME.palpate-" in the folder of the target;
+/// six random characters follow.
 std::string temporary_prefix(const std::string& target);
 
 /// Removes the temporary files and folders for `target` that belong to this user and that no
-/// process has locked: their process has ended.
+/// process has locked: their process was killed.
 void remove_stale_temporaries(const std::string& target);
 /// The same for all targets in a folder.
 void remove_stale_temporaries_in(const std::string& folder);

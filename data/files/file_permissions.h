@@ -8,8 +8,7 @@
 
 namespace palpate::data {
 
-// Which file a path leads to, by device and inode: two paths with the same identity are one file.
-
+/// Which file a path leads to, by device and inode: two paths with the same identity are one file.
 /// {0, 0}: there is no file.
 struct FileIdentity {
   dev_t device = 0;
@@ -23,16 +22,16 @@ FileIdentity identity_of(const std::string& path);
 /// The number of hard links of the file that `path` leads to; 0: there is no file.
 std::uint64_t names_of_file(const std::string& path);
 
-// Resolves symbolic links of a path that is to be written. In a shared folder another user could
-// place a link that redirects the output: only links of this user and of root are followed.
-
+/// A path that is to be written, with its symbolic links resolved.
 struct ResolvedPath {
   std::string path;  ///< absolute, links resolved
   std::string
       fault;  ///< why it was not resolved, to be appended to the path in a message; "": resolved
 };
 
-/// The file that `path` leads to; the last component need not exist.
+/// The file that `path` leads to; the last component need not exist. In a shared folder another
+/// user could place a link that redirects the output: only links of this user and of root are
+/// followed.
 ResolvedPath resolve_trusted_links(const std::string& path);
 
 /// The -wal, -shm and -journal of a database, where they exist, must be regular files of this user,

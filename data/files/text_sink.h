@@ -1,5 +1,6 @@
 #pragma once
-// Internal to data/: output streams for the text of exports, with errors that name the file.
+// Output streams for the text of exports, with errors that name the file, and protection against
+// formula injection.
 
 #include <deque>
 #include <future>
@@ -7,10 +8,6 @@
 #include <string_view>
 
 namespace palpate::data {
-
-// Protection against formula injection: text cells of CSV and TSV files that a spreadsheet would
-// evaluate as a formula get a leading apostrophe
-// (https://owasp.org/www-community/attacks/CSV_Injection).
 
 namespace formula {
 constexpr bool starts_formula(std::string_view text) {
@@ -23,8 +20,9 @@ constexpr bool starts_formula_behind_quotes(std::string_view text) {
 }
 }  // namespace formula
 
-/// Whether a text cell gets a leading ': it begins with = + - @ tab CR or LF, or would be read back
-/// as a guarded one ('=1). Numbers are never guarded.
+/// Whether a text cell of a CSV or TSV file gets a leading ', because a spreadsheet would evaluate
+/// it as a formula (https://owasp.org/www-community/attacks/CSV_Injection): it begins with = + - @
+/// tab CR or LF, or would be read back as a guarded one ('=1). Numbers are never guarded.
 constexpr bool needs_guard(std::string_view text) {
   return !text.empty() && (text[0] == '\'' ? formula::starts_formula_behind_quotes(text.substr(1))
                                            : formula::starts_formula(text));

@@ -28,10 +28,11 @@
 #include "data/files/atomic_folder.h"
 #include "data/files/file_permissions.h"
 #include "data/files/output_check.h"
-#include "data/store/connection.h"
 #include "data/store/frames.h"
 #include "data/store/protocol_rows.h"
 #include "data/store/schema.h"
+#include "data/store/statement.h"
+#include "data/store/store_error.h"
 #include "data/store/unmaskings.h"
 
 namespace palpate::data {

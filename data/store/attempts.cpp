@@ -23,6 +23,7 @@
 #include "data/store/protocol_rows.h"
 #include "data/store/record_columns.h"
 #include "data/store/seals.h"
+#include "data/store/statement.h"
 #include "data/store/task_text.h"
 #include "data/trial_columns.h"
 

@@ -17,9 +17,9 @@
 
 namespace palpate::data {
 
-// Internal to data/store: compresses servo samples, lossless to the bit. The format is the column
-// `packing` of the table samples; tests/fuzz/samples.cpp feeds the decoder arbitrary bytes.
-
+/// How servo samples are compressed, lossless to the bit: the column `packing` of the table
+/// samples. tests/fuzz/samples.cpp feeds the decoder arbitrary bytes.
+///
 /// Packing 6: packing 5 with `bodies` and the fields of TrialRecord::bodies, for samples with a
 /// body. Packing 5: the planes of packing 3 as one zstd frame (RFC 8878), which takes less room and
 /// time. A long standstill is still packed in 3 or 4, uncompressed.
@@ -60,10 +60,6 @@ PackedSamples pack_samples(const std::vector<SampleRecord>& samples,
 RecordedSamples unpack_samples(const void* data, std::size_t size, std::int64_t count,
                                int packing = kPlainSamplesPacking);
 
-// Reads attempts in order and verifies them: every session visited against its hash chain
-// (seals.h), every value against the range that palpate writes. Store, and StationDatabase for
-// merge, read trials through this only.
-
 enum class AttemptState { running, completed, cut_off };
 
 enum class SampleReading {
@@ -83,8 +79,11 @@ struct AttemptFilter {
   bool seals_verified = false;  ///< they are verified already, in the same snapshot of the database
 };
 
-/// Visits attempts by protocol, participant number, session, trial and attempt. Also verifies the
-/// rows of a session that are not visited. \param version of the schema; seals exist since 3.
+/// Visits attempts by protocol, participant number, session, trial and attempt, and verifies them:
+/// every session visited against its hash chain (seals.h), every value against the range that
+/// palpate writes. Store, and StationDatabase for merge, read trials through this only. Also
+/// verifies the rows of a session that are not visited.
+/// \param version of the schema; seals exist since 3.
 /// \throws SQLite::Exception (damage), StoreRefused (a row does not match its seal).
 void read_attempts(SQLite::Database& db, const std::string& path, int version,
                    const AttemptFilter& filter,

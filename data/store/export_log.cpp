@@ -11,9 +11,11 @@
 #include <utility>
 
 #include "data/files/file_permissions.h"
-#include "data/store/connection.h"
 #include "data/store/schema.h"
+#include "data/store/statement.h"
 #include "data/store/store.h"
+#include "data/store/store_error.h"
+#include "data/store/writer_lock.h"
 
 namespace palpate::data {
 namespace {

@@ -27,6 +27,8 @@
 #include "data/store/frames.h"
 #include "data/store/open.h"
 #include "data/store/record_columns.h"
+#include "data/store/statement.h"
+#include "data/store/store_error.h"
 
 namespace palpate::data {
 namespace {

@@ -16,6 +16,9 @@
 #include "data/store/connection.h"
 #include "data/store/protocol_rows.h"
 #include "data/store/schema.h"
+#include "data/store/statement.h"
+#include "data/store/store_error.h"
+#include "data/store/writer_lock.h"
 
 namespace palpate::data {
 

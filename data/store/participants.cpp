@@ -12,6 +12,8 @@
 #include "data/store/forget.h"
 #include "data/store/protocol_rows.h"
 #include "data/store/record_columns.h"
+#include "data/store/statement.h"
+#include "data/store/store_error.h"
 
 namespace palpate::data {
 namespace {

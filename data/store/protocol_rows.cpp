@@ -6,7 +6,7 @@
 #include "data/base/checksum.h"
 #include "data/base/json_text.h"
 #include "data/errors.h"
-#include "data/store/connection.h"
+#include "data/store/statement.h"
 
 namespace palpate::data {
 namespace {

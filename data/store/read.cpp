@@ -7,6 +7,8 @@
 #include "data/store/connection.h"
 #include "data/store/protocol_rows.h"
 #include "data/store/record_columns.h"
+#include "data/store/statement.h"
+#include "data/store/store_error.h"
 #include "data/store/unmaskings.h"
 
 namespace palpate::data {

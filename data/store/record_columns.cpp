@@ -15,7 +15,7 @@
 #include <string>
 
 #include "data/base/checksum.h"
-#include "data/base/text.h"
+#include "data/base/utf8.h"
 #include "data/errors.h"
 #include "data/store/task_text.h"
 #include "data/trial_columns.h"

@@ -10,17 +10,16 @@
 #include <vector>
 
 #include "data/record.h"
-#include "data/store/connection.h"
+#include "data/store/statement.h"
 #include "data/store/store.h"
 
 namespace palpate::data {
 
-// Internal to data/store: validates values read from a file that may be damaged or edited.
-
-/// Together with RowReader, which refuses NULL and booleans other than 0 and 1, these are all of
-/// the table's CHECK constraints on an attempt. SQLite's quick_check takes twice as long for them,
-/// and skips them on a read-only disk. \throws SQLite::Exception (damage), naming participant,
-/// session, trial and field.
+/// Validates values read from a file that may be damaged or edited. Together with RowReader, which
+/// refuses NULL and booleans other than 0 and 1, these are all of the table's CHECK constraints on
+/// an attempt. SQLite's quick_check takes twice as long for them, and skips them on a read-only
+/// disk.
+/// \throws SQLite::Exception (damage), naming participant, session, trial and field.
 void require_valid_run(const StoredTrial& trial);
 void require_valid_record(const StoredTrial& trial);
 
@@ -72,11 +71,8 @@ inline constexpr const char* kFromProtocolDown =
     " FROM protocols pr CROSS JOIN participants pa ON pa.protocol_id = pr.id CROSS JOIN sessions s "
     "ON s.participant_id = pa.id ";
 
-// Internal to data/store: validates values before they are written, so that a caller learns every
-// fault at once instead of SQLite's first failed CHECK. Every writing call of Store uses it;
-// attempts.cpp uses is_clean_utf8 on what it reads.
-
-/// Collects the faults of one record.
+/// Collects the faults of one record before it is written, so that a caller learns every fault at
+/// once instead of SQLite's first failed CHECK. Every writing call of Store uses it.
 class Validator {
  public:
   /// Text that SQLite and CSV return unchanged: UTF-8 without NUL.
@@ -93,7 +89,7 @@ class Validator {
   std::vector<std::string> faults_;
 };
 
-bool is_clean_utf8(std::string_view text);  ///< well-formed, and no NUL
+bool is_clean_utf8(std::string_view text);  ///< well-formed, and no NUL; also of what is read
 
 void validate(Validator& validator, const ProtocolInfo& protocol);
 void validate(Validator& validator, const RunInfo& info, bool simulated);

@@ -8,6 +8,7 @@
 #include "data/store/connection.h"
 #include "data/store/protocol_rows.h"
 #include "data/store/record_columns.h"
+#include "data/store/statement.h"
 #include "data/store/unmaskings.h"
 #include "data/stored_protocol.h"
 

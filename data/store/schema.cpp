@@ -19,8 +19,8 @@
 #include "data/errors.h"
 #include "data/files/atomic_file.h"
 #include "data/files/atomic_folder.h"
-#include "data/store/connection.h"
 #include "data/store/seals.h"
+#include "data/store/store_error.h"
 #include "data/store/sweep_file.h"
 
 namespace palpate::data {

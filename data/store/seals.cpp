@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "data/errors.h"
-#include "data/store/connection.h"
 #include "data/store/record_columns.h"
 #include "data/store/schema.h"
+#include "data/store/statement.h"
 #include "data/store/task_text.h"
 #include "data/trial_columns.h"
 

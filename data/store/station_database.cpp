@@ -8,11 +8,11 @@
 #include "data/files/file_permissions.h"
 #include "data/files/output_check.h"
 #include "data/store/attempts.h"
-#include "data/store/connection.h"
 #include "data/store/open.h"
 #include "data/store/protocol_rows.h"
 #include "data/store/schema.h"
 #include "data/store/store.h"
+#include "data/store/store_error.h"
 
 namespace palpate::data {
 namespace {

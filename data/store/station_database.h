@@ -9,7 +9,7 @@
 #include <string>
 
 #include "data/files/file_permissions.h"
-#include "data/store/connection.h"
+#include "data/store/writer_lock.h"
 
 namespace palpate::data {
 

@@ -31,6 +31,9 @@
 #include "data/store/connection.h"
 #include "data/store/open.h"
 #include "data/store/seals.h"
+#include "data/store/statement.h"
+#include "data/store/store_error.h"
+#include "data/store/writer_lock.h"
 #include "data/sweep_record.h"
 
 namespace palpate::data {

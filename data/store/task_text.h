@@ -17,11 +17,10 @@ std::optional<std::string> task_text(const TaskRecord& task);
 /// The inverse. \throws std::invalid_argument: damaged
 TaskRecord parse_task_text(const std::string& text);
 
-// Runs in which the renderer's torque was left out; each has a note.
-
 /// The note of a run with a device that senses the stylus's axis but drives force alone.
 inline constexpr const char* kTorqueLeftOutNote = R"({"torque":"left out"})";
 
+/// Runs in which the renderer's torque was left out; each has a note.
 class TorqueNotes {
  public:
   TorqueNotes() = default;

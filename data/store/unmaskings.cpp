@@ -1,7 +1,7 @@
 #include "data/store/unmaskings.h"
 
-#include "data/store/connection.h"
 #include "data/store/late_table.h"
+#include "data/store/statement.h"
 
 namespace palpate::data {
 namespace {

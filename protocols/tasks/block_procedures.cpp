@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 #include "protocols/tasks/block_tracks.h"
 #include "protocols/tasks/levels.h"
 #include "protocols/tasks/parse_blocks.h"

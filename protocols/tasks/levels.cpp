@@ -14,6 +14,7 @@
 
 #include "data/base/json_text.h"
 #include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 #include "protocols/parse_scene.h"
 #include "protocols/tasks/block_order.h"
 

@@ -88,9 +88,8 @@ std::string level_in_words(const TaskBlock& block, double level);
 /// The same of a varied number. \param path  JSON pointer
 std::string number_in_words(const std::string& path, double number);
 
-// A simulated participant for a block with adaptive levels: a generic psychometric function fitted
-// to the block's range, not a model of a person.
-
+/// Of a simulated participant for a block with adaptive levels: a generic psychometric function
+/// fitted to the block's range, not a model of a person.
 struct TypicalSettings {
   double place = 0.5;    ///< of the threshold, as a share of the levels' range, from the hard end
   double spread = 0.15;  ///< sd of the function, likewise

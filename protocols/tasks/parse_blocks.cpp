@@ -13,7 +13,7 @@
 
 #include "protocols/answer_keys.h"
 #include "protocols/factors.h"
-#include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 #include "protocols/order.h"
 #include "protocols/parse_scene.h"
 #include "protocols/protocol.h"

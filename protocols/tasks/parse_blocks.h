@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 #include "protocols/parse_scene.h"
 #include "protocols/procedures/procedure_spec.h"
 #include "protocols/protocol.h"

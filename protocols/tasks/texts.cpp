@@ -9,6 +9,7 @@
 
 #include "data/base/cell_name.h"
 #include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 
 namespace palpate::protocols {
 namespace {

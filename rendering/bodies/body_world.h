@@ -1,6 +1,6 @@
 #pragma once
-// Bodies that move and collide, without a probe: their constants and their state. World frame, SI
-// units.
+// Bodies that move and collide, without a probe: their constants, their state and its steps. World
+// frame, SI units. No step allocates.
 
 #include <cstddef>
 #include <cstdint>
@@ -169,11 +169,9 @@ BodyWorldState initial_state(const BodyWorld& world);
 ConvexPlace place_of(const CollidingPart& part, const Pose& frame);
 SurfacePlace place_of(const CollisionSurface& surface, const Pose& frame);
 
-// A step of bodies that collide. Bodies move freely until a pair meets; there they bounce, and the
-// step continues. Bodies that touch or may meet within the rest of the step are held apart by
-// impulses that solve a linear complementarity problem. Nothing here allocates.
-
-/// Moves all bodies.
+/// Moves all bodies. They move freely until a pair meets; there they bounce, and the step
+/// continues. Bodies that touch or may meet within the rest of the step are held apart by impulses
+/// that solve a linear complementarity problem.
 /// \param duration  s
 void step_bodies(const BodyWorld& world, BodyWorldState& state, double duration);
 
@@ -195,12 +193,11 @@ bool mark_connected(const BodyWorld& world, BodyWorldState& state, double durati
 bool touches_nothing(const BodyWorld& world, BodyWorldState& state, std::uint32_t body,
                      double duration, double distance);
 
-// Bodies that have come to rest sleep: they are neither moved nor held against each other until
-// something comes near. Nothing here allocates.
-
-/// Call after a step. Bodies that touch each other fall asleep together once each has been at rest
-/// for half a second. Without gravity and damping, a body sleeps only with zero momentum, so that
-/// no momentum is lost. \param duration  s, of the step
+/// Call after a step. Bodies that have come to rest sleep: they are neither moved nor held against
+/// each other until something comes near. Bodies that touch each other fall asleep together once
+/// each has been at rest for half a second. Without gravity and damping, a body sleeps only with
+/// zero momentum, so that no momentum is lost.
+/// \param duration  s, of the step
 void fall_asleep(const BodyWorld& world, BodyWorldState& state, double duration);
 
 /// Wakes a body and those that fell asleep with it.

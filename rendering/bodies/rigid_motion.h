@@ -14,10 +14,8 @@ class ConvexMesh;
 
 namespace palpate::rendering {
 
-// Mass, centre and inertia of solids from their surfaces, exactly (divergence theorem).
-
-/// Integrals over a solid, of places relative to a point near it: squares of the distance to a far
-/// origin would lose digits.
+/// Integrals over a solid from its surface, exactly (divergence theorem), of places relative to a
+/// point near it: squares of the distance to a far origin would lose digits.
 struct VolumeMoments {
   Vec3 about;             ///< m; that point
   double volume = 0;      ///< m^3

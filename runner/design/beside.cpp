@@ -20,6 +20,7 @@
 #include "runner/touch/scene_notes.h"
 #include "runner/usage_error.h"
 #include "stimuli/mesh_file.h"
+#include "stimuli/solids/gmsh_file.h"
 #include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::runner::design {

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "data/base/base64.h"
 #include "data/base/json_text.h"
 #include "data/base/text.h"
 #include "protocols/parse.h"

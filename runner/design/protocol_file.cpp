@@ -13,6 +13,7 @@
 #include "data/files/atomic_file.h"
 #include "data/store/store.h"
 #include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 #include "runner/usage_error.h"
 
 namespace palpate::runner::design {

@@ -8,6 +8,7 @@
 #include "data/base/json_text.h"
 #include "data/files/atomic_file.h"
 #include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 
 namespace palpate::runner::devices {
 namespace {

@@ -11,10 +11,9 @@
 
 namespace palpate::runner::devices {
 
-// Two devices of one model that hold the ends of a stylus, each a point with forces, like the two
-// Phantoms of Ho, Basdogan & Srinivasan (2000), section 2: five degrees of freedom, sensed and
-// driven. World frame: the tip's device.
-
+/// Two devices of one model that hold the ends of a stylus, each a point with forces, like the two
+/// Phantoms of Ho, Basdogan & Srinivasan (2000), section 2: five degrees of freedom, sensed and
+/// driven. World frame: the tip's device.
 class PairDevice final : public servo::Device {
  public:
   /// \param name         name of the kind

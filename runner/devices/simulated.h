@@ -83,15 +83,14 @@ class SimulatedStylus final : public servo::Device {
   Vec3 force_, torque_;  ///< N; N m about the grip, held over the tick
 };
 
-// The device of `run --device simulated`: its hand rests outside the workspace, strokes through it
-// and back, and repeats this without feedback.
-
 struct StrokeSettings {
   double distance = 0.1;  ///< m, from the centre of the workspace, at rest
   double rest = 1.0;      ///< s, between strokes, so that a trial can begin
   double stroke = 1.5;    ///< s, forth and back
 };
 
+/// The device of `run --device simulated`: its hand rests outside the workspace, strokes through it
+/// and back, and repeats this without feedback.
 class StrokingStylus final : public servo::Device {
  public:
   /// \param rate  Hz, of the servo

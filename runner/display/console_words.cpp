@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include "data/base/text.h"
+#include "data/base/utf8.h"
 #include "runner/safety/fault_signals.h"
 
 namespace palpate::runner::display {

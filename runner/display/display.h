@@ -17,9 +17,8 @@
 
 namespace palpate::runner::display {
 
-// Source of the moments that a window shows.
-
-/// All functions are called by the display's thread, return at once and never make a servo wait.
+/// Source of the moments that a window shows. All functions are called by the display's thread,
+/// return at once and never make a servo wait.
 class TouchSource {
  public:
   virtual ~TouchSource() = default;

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "data/base/text.h"
+#include "data/base/utf8.h"
 #include "runner/display/key_names.h"
 
 namespace palpate::runner::display {

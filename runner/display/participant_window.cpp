@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "data/base/text.h"
+#include "data/base/utf8.h"
 #include "runner/display/display.h"
 #include "runner/display/key_names.h"
 #include "runner/display/page_elements.h"

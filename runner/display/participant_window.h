@@ -1,4 +1,5 @@
 #pragma once
+// The participant's screen as a window.
 
 #include <atomic>
 #include <cstdint>
@@ -15,9 +16,6 @@
 #include "runner/display/window_layout.h"
 
 namespace palpate::runner::display {
-
-// Draws a page of the participant's screen into an image, without a display. Pango sets the text:
-// it finds a font for every character and handles right-to-left and joined scripts.
 
 struct Image {
   int width = 0, height = 0;
@@ -39,9 +37,10 @@ struct PageOptions {
   PictureBehind picture{};
 };
 
-/// Deterministic. Invalid UTF-8 is shown as a replacement character. A long text to read continues
-/// on further screens; other texts are set smaller and, at the smallest readable size, end in an
-/// ellipsis.
+/// Draws a page of the participant's screen into an image, without a display. Pango sets the text:
+/// it finds a font for every character and handles right-to-left and joined scripts. Deterministic.
+/// Invalid UTF-8 is shown as a replacement character. A long text to read continues on further
+/// screens; other texts are set smaller and, at the smallest readable size, end in an ellipsis.
 Image draw_page(const Page& page, int width, int height, const PageOptions& setting = {});
 
 /// Number of screens that a page takes.

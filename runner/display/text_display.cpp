@@ -14,6 +14,7 @@
 #include <utility>
 
 #include "data/base/text.h"
+#include "data/base/utf8.h"
 #include "data/base/words.h"
 #include "runner/display/console_words.h"
 

@@ -22,8 +22,6 @@
 
 namespace palpate::runner::display {
 
-// The terminal of the text display: its mode, its width, and waking the thread that waits for keys.
-
 /// Puts the terminal into character mode without echo; Ctrl-C still sends a signal.
 class RawTerminal {
  public:
@@ -99,9 +97,7 @@ class TextInput {
   std::string partial_;  ///< an incomplete UTF-8 sequence
 };
 
-// Participant's screen and console as text, written by the thread of TextDisplay.
-
-/// A text and the file descriptor to write it to.
+/// A text, written by the thread of TextDisplay, and the file descriptor to write it to.
 struct Output {
   int file = STDOUT_FILENO;
   std::string text;

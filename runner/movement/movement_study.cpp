@@ -14,7 +14,7 @@
 #include "runner/movement/touched_trial.h"
 #include "runner/output/outputs.h"
 #include "runner/output/progress_line.h"
-#include "runner/session/replay.h"
+#include "runner/session/recorded_trial.h"
 #include "runner/study/study_trials.h"
 #include "runner/usage_error.h"
 

@@ -11,6 +11,7 @@
 #include "data/export/sample_slots.h"
 #include "protocols/tasks/levels.h"
 #include "runner/session/live_forces.h"
+#include "runner/session/recorded_trial.h"
 #include "runner/session/replay.h"
 #include "stimuli/convex_mesh.h"
 

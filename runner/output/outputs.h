@@ -16,9 +16,8 @@
 
 namespace palpate::runner::output {
 
-// CSV with 17 significant digits, so that numbers are read back exactly everywhere.
-
-/// Fields are appended to a row from left to right and are never quoted: texts are names of
+/// CSV with 17 significant digits, so that numbers are read back exactly everywhere. Fields are
+/// appended to a row from left to right and are never quoted: texts are names of
 /// letters, digits, '-' and '+'.
 class CsvText {
  public:

@@ -1,15 +1,13 @@
 #pragma once
-// Progress of a long command, on a terminal only.
+// Progress of a long command, on a terminal only, and its end by Ctrl-C.
 
 #include <atomic>
 #include <string>
 
 namespace palpate::runner::output {
 
-// Ctrl-C during a long command.
-
-/// From now on the first SIGINT (Ctrl-C) or SIGTERM only sets the returned flag, so that the
-/// command can end cleanly; a second one ends the program as usual.
+/// For Ctrl-C during a long command: from now on the first SIGINT (Ctrl-C) or SIGTERM only sets the
+/// returned flag, so that the command can end cleanly; a second one ends the program as usual.
 const std::atomic<bool>& catch_stop_signals();
 
 /// ns, of a steady clock.

@@ -8,6 +8,7 @@
 #include <string>
 #include <type_traits>
 
+#include "runner/participants/deepest_point.h"
 #include "runner/participants/lane_math.h"
 #include "runner/participants/shape_lines.h"
 

@@ -10,7 +10,7 @@
 #include <iterator>
 #include <utility>
 
-#include "data/base/text.h"
+#include "data/base/utf8.h"
 #include "data/base/words.h"
 #include "protocols/answer_keys.h"
 #include "protocols/tasks/levels.h"

@@ -15,7 +15,6 @@ namespace palpate::runner::participants::lane {
 
 // As many floats as a register holds, for loops that compilers do not vectorise by themselves. Each
 // lane has the operations of a single float, so results are the same to the bit at every width.
-
 #if defined(__AVX512F__)
 inline constexpr int kWidth = 16;
 #elif defined(__AVX__)

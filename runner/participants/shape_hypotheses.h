@@ -14,18 +14,15 @@
 
 namespace palpate::runner::participants {
 
-// The surface at which a stimulus is felt first.
-
-/// The convex parts of the outermost surface that has a stiffness, relative to the centre of the
-/// workspace. That is the object's surface or, if its stiffness is 0, the uppermost layer with a
-/// stiffness. The simulated participant does not know the layers below it.
+/// The surface at which a stimulus is felt first: the convex parts of the outermost surface that
+/// has a stiffness, relative to the centre of the workspace. That is the object's surface or, if
+/// its stiffness is 0, the uppermost layer with a stiffness. The simulated participant does not
+/// know the layers below it.
 /// \throws MeshError
 std::vector<PlacedPart> felt_parts(const stimuli::ObjectSpec& stimulus);
 
 /// Whether there is such a surface.
 bool can_be_felt(const stimuli::ObjectSpec& stimulus);
-
-// Distinguishable orientations of a stimulus.
 
 /// The rotations about the origin that map a solid to itself, the identity first: its field then
 /// changes by at most a fifth of its spacing (root mean square, near the surface). An axis of
@@ -33,7 +30,8 @@ bool can_be_felt(const stimuli::ObjectSpec& stimulus);
 /// by 360 degrees over 2 to 32 are tried about each.
 std::vector<Quat> symmetries(const std::vector<PlacedPart>& parts, const DistanceField& field);
 
-/// Rotations some 11 to 14 degrees apart: of each set that is equivalent by symmetry, the smallest.
+/// The distinguishable orientations of a stimulus, some 11 to 14 degrees apart: of each set that is
+/// equivalent by symmetry, the smallest.
 std::vector<Mat3> distinct_rotations(const std::vector<Quat>& group);
 
 /// Shape x rotation grid modulo the shape's symmetry. Immutable, so threads can share it. A

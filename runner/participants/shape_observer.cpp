@@ -9,8 +9,10 @@
 #include <string>
 #include <type_traits>
 
+#include "runner/participants/deepest_point.h"
 #include "runner/participants/lane_math.h"
 #include "runner/participants/shape_lines.h"
+#include "runner/participants/solid_lines.h"
 
 // The loops over the hypotheses of a block are written for the compiler to vectorise; the build
 // gives this file -fno-math-errno and -fno-trapping-math, which change no value.

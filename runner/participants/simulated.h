@@ -16,11 +16,6 @@
 
 namespace palpate::runner::participants {
 
-// The exploration of a simulated hand: it approaches from above, slides over the surface in a
-// randomly changing direction with light pressure, lifts off and approaches again. It senses
-// contact with a reaction delay and does not know the shape. If headings are chosen, the caller,
-// which has beliefs about the shape, sets them.
-
 /// Contact that the hand senses at one tick.
 struct TouchState {
   bool contact = false;
@@ -29,6 +24,10 @@ struct TouchState {
   double along = 0;  ///< m; from the tip along the stylus to that point
 };
 
+/// The exploration of a simulated hand: it approaches from above, slides over the surface in a
+/// randomly changing direction with light pressure, lifts off and approaches again. It senses
+/// contact with a reaction delay and does not know the shape. If headings are chosen, the caller,
+/// which has beliefs about the shape, sets them.
 class Explorer {
  public:
   /// \param grip  m from the tip; \param wall_stiffness  N/m, determines the aim depth for a light

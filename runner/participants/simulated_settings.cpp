@@ -15,6 +15,7 @@
 #include "data/base/checksum.h"
 #include "data/base/json_text.h"
 #include "data/base/random.h"
+#include "protocols/fault_list.h"
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 

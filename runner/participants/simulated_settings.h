@@ -1,6 +1,7 @@
 #pragma once
-// Every constant of the simulated participant, from versioned files that do not change. Versions
-// differ by switches, which a patch can set in any version.
+// Every constant of the simulated participant, as JSON: frozen versions in files that do not
+// change, values implied by older versions, patches and the checksum. Versions differ by switches,
+// which a patch can set in any version.
 
 #include <cstdint>
 #include <map>
@@ -24,9 +25,6 @@ struct FrozenSettings {
 };
 /// Ascending; ends with version 0.
 extern const FrozenSettings kFrozenSettings[];
-
-// The settings of simulated participants as JSON: frozen versions, values implied by older
-// versions, patches and the checksum.
 
 /// The reason why a setting cannot have that value, as "must be ..."; empty: it can.
 /// \param pointer  JSON pointer into the complete settings

@@ -15,6 +15,7 @@
 #include "protocols/parse.h"
 #include "protocols/tasks/levels.h"
 #include "stimuli/primitives.h"
+#include "stimuli/signed_distance.h"
 
 namespace palpate::runner::participants {
 namespace {

@@ -24,35 +24,14 @@
 
 namespace palpate::runner::participants {
 
-// How a simulated participant judges levels: one noisy estimate for each felt stimulus. A model
-// that is not fitted to any person.
-//
-//   compare   each interval gives an estimate, its level with noise; the largest (smallest) is
-//             chosen. Of two intervals, the comparison is chosen with probability
-//             Phi((level - standard) / (sqrt(2) sd)) = Phi((level - standard) / (weber standard)).
-//             same_different: differ by more than sd
-//   detect    "yes" by a psychometric function (protocols/tasks/levels.h)
-//   rate      number = level^exponent, times exp(noise)
-//   adjust    feels both; turns as often as needed if its estimates were true; feels the turned one
-//             again; done when they are "same" by the criterion above, or less than half a turn
-//             apart, or when it turns no further. Returns to an interval that it did not touch
-//   identify  stimuli that differ in stiffness only: the nearest stiffness, as a ratio, to the
-//             estimate; shapes: SimulatedParticipant; else correct, except for lapses
-// With probability `lapse` the answer is random.
-//
-// Where a protocol has a view, the felt estimate is the true level with that noise, whatever the
-// hand measured, so that its sd is known; what is seen of an interval gives a second estimate, and
-// both are combined (cue_combination.h). Blur adds to its sd where the level is a length.
-
-// Estimates a level from exploration: one estimate for each interval.
-//
-//   stiffness   mean of force over depth in ticks with contact, without noise. Also used to
-//               identify stimuli that differ in stiffness only
-//   a length    ("..._m") that changes the felt surface: knowing the kind of object, it takes
-//               the level whose surface passes best through the felt places (least squares,
-//               linearised at the true level). The places have the noise of the model's percepts
-//   any other   (friction, damping, depth of layers, angles, meshes): no estimate
-
+/// Estimates a level from exploration: one estimate for each interval.
+///
+///   stiffness   mean of force over depth in ticks with contact, without noise. Also used to
+///               identify stimuli that differ in stiffness only
+///   a length    ("..._m") that changes the felt surface: knowing the kind of object, it takes
+///               the level whose surface passes best through the felt places (least squares,
+///               linearised at the true level). The places have the noise of the model's percepts
+///   any other   (friction, damping, depth of layers, angles, meshes): no estimate
 class LevelPercept {
  public:
   /// \param protocol  must outlive it
@@ -119,6 +98,26 @@ struct JudgementSettings {
 /// the true levels, not what was felt.
 using JudgementOf = std::function<JudgementSettings(int, const protocols::Trial&)>;
 
+/// How a simulated participant judges levels: one noisy estimate for each felt stimulus. A model
+/// that is not fitted to any person.
+///
+///   compare   each interval gives an estimate, its level with noise; the largest (smallest) is
+///             chosen. Of two intervals, the comparison is chosen with probability
+///             Phi((level - standard) / (sqrt(2) sd)) = Phi((level - standard) / (weber standard)).
+///             same_different: differ by more than sd
+///   detect    "yes" by a psychometric function (protocols/tasks/levels.h)
+///   rate      number = level^exponent, times exp(noise)
+///   adjust    feels both; turns as often as needed if its estimates were true; feels the turned
+///             one again; done when they are "same" by the criterion above, or less than half a
+///             turn apart, or when it turns no further. Returns to an interval that it did not
+///             touch
+///   identify  stimuli that differ in stiffness only: the nearest stiffness, as a ratio, to the
+///             estimate; shapes: SimulatedParticipant; else correct, except for lapses
+/// With probability `lapse` the answer is random.
+///
+/// Where a protocol has a view, the felt estimate is the true level with that noise, whatever the
+/// hand measured, so that its sd is known; what is seen of an interval gives a second estimate, and
+/// both are combined (cue_combination.h). Blur adds to its sd where the level is a length.
 class TaskJudgement {
  public:
   /// \param protocol  must outlive it

@@ -15,9 +15,8 @@
 
 #include "data/base/text.h"
 #include "data/column_table.h"
-#include "data/export/delimited_row.h"
+#include "data/export/trial_table.h"
 #include "data/store/store.h"
-#include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "runner/session/simulated_study.h"
 #include "runner/study/schedule_text.h"

@@ -1,5 +1,5 @@
 #pragma once
-// Signal handlers: zero force before any signal ends the program.
+// Signal handlers (zero force before any signal ends the program), and the meaning of fault bits.
 
 #include <algorithm>
 #include <array>
@@ -13,9 +13,6 @@
 #include "runner/servo/servo_thread.h"
 
 namespace palpate::runner::safety {
-
-// The meaning of every fault bit of a sample: the one table for the console, a session's messages
-// and the codebook of exports.
 
 inline constexpr std::array<rendering::FaultBit, 8> kServoFaults = {{
     {servo::servo_fault::kForceLimited, "force-limited", "force limited",
@@ -42,7 +39,8 @@ inline constexpr std::array<rendering::FaultBit, 8> kServoFaults = {{
      "the device's reading was late: the one before was used again"},
 }};
 
-/// All bits of a sample or a trial, lowest first.
+/// The meaning of every fault bit of a sample or a trial, lowest first: the one table for the
+/// console, a session's messages and the codebook of exports.
 inline constexpr auto kFaultTable = [] {
   std::array<rendering::FaultBit, rendering::kRenderFaults.size() + kServoFaults.size()> all{};
   const auto rest =

@@ -1,6 +1,8 @@
 #pragma once
-// The runner's interface to a device behind the watchdog: reads and writes go through the guard
-// process, which survives a crash of the runner.
+// The runner's interface to a device behind the watchdog: a small separate process (the guard) that
+// owns the real device and commands zero force if the runner crashes or hangs. It passes readings
+// to the runner and the runner's commands to the device; when the runner's calls stop, it keeps
+// sending zero force.
 
 #include <array>
 #include <atomic>
@@ -14,12 +16,6 @@
 #include "runner/servo/shared_value.h"
 
 namespace palpate::runner::safety {
-
-// The watchdog: a small separate process (the guard) that owns the real device and commands zero
-// force if the runner crashes or hangs. It passes readings to the runner and the runner's commands
-// to the device; when the runner's calls stop, it keeps sending zero force.
-
-// Memory shared by the runner and its guard process. No locks: either may die at any point.
 
 /// A DeviceReading in plain numbers.
 struct GuardedReading {
@@ -55,7 +51,8 @@ struct FixedCapabilities {
 
 enum class GuardState : std::uint32_t { opening, ready, failed, ended };
 
-/// Only lock-free atomics and plain memory, without pointers.
+/// Memory shared by the runner and its guard process. No locks: either may die at any point. Only
+/// lock-free atomics and plain memory, without pointers.
 struct GuardChannel {
   // Written by the runner.
   std::atomic<std::uint32_t> calls{0};  ///< futex: increases with each of the four below

@@ -8,8 +8,9 @@
 #include <string_view>
 #include <utility>
 
-#include "data/base/text.h"
+#include "data/base/utf8.h"
 #include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 #include "protocols/parse.h"
 
 namespace palpate::runner::serve {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "protocols/fault_list.h"
 #include "protocols/json_document.h"
 #include "runner/safety/fault_signals.h"
 #include "runner/scene_builder.h"

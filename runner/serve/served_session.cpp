@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "data/base/text.h"
-#include "protocols/json_document.h"
+#include "protocols/fault_list.h"
 #include "protocols/tasks/block_order.h"
 #include "runner/safety/fault_signals.h"
 #include "runner/session/session_scenes.h"

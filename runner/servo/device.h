@@ -11,8 +11,7 @@
 
 namespace palpate::runner::servo {
 
-// Settings to open a device, and the results of looking for devices.
-
+/// Settings to open a device, or to look for devices.
 struct DeviceConfig {
   double rate = 1000;                ///< Hz, of the servo
   double stylus_length = 0.12;       ///< m

@@ -11,9 +11,8 @@
 namespace palpate::runner::servo::servo_fault {
 
 // The fault bits of a servo tick in addition to the renderer's (rendering/render_fault.h). Each bit
-// needs a row in runner/safety/fault_signals.h, which explains it; a test checks that.
-
-// Bits of Sample::faults; the renderer uses 1 to 8 and from 4096 on.
+// needs a row in runner/safety/fault_signals.h, which explains it; a test checks that. Bits of
+// Sample::faults; the renderer uses 1 to 8 and from 4096 on.
 inline constexpr std::uint32_t kForceLimited = 16;
 inline constexpr std::uint32_t kDeviceLost = 32;
 inline constexpr std::uint32_t kMissedTicks = 64;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "rendering/bodies/soft/soft_scene.h"
+
 namespace palpate::runner::servo {
 namespace {
 

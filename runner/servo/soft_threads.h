@@ -11,7 +11,8 @@
 #include <thread>
 #include <vector>
 
-#include "rendering/bodies/soft/soft_scene.h"
+#include "rendering/bodies/soft/soft_object.h"
+#include "rendering/scene.h"
 #include "runner/servo/realtime.h"
 #include "runner/servo/triple_buffer.h"
 

@@ -50,9 +50,8 @@ class ForceDirectionCheck final : public rendering::Renderer {
   bool both_ends_;
 };
 
-// Plausibility of the computer's clock, the source of every date on record.
-
-/// ns since 1970, UTC.
+/// For the plausibility of the computer's clock, the source of every date on record. ns since 1970,
+/// UTC.
 struct ClockEvidence {
   std::int64_t now_ns = 0;
   std::optional<std::int64_t> newest_record_ns;  ///< of the study

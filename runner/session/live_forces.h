@@ -16,14 +16,13 @@
 
 namespace palpate::runner::session {
 
-// Measures how a trial's object was touched, to distinguish active from passive exploration.
-// Defined here for live and simulated sessions alike.
-//
-//   contact share  ticks with contact (at least one contact place with force) over all ticks, from
-//                  time zero to the last tick before the answer
-//   edge dwell     ticks with contact on an edge, times the servo's period: the deepest contact's
-//                  point is within kReach of a sharp edge or vertex (runner/sharp_edges.h)
-
+/// Measures how a trial's object was touched, to distinguish active from passive exploration.
+/// Defined here for live and simulated sessions alike.
+///
+///   contact share  ticks with contact (at least one contact place with force) over all ticks, from
+///                  time zero to the last tick before the answer
+///   edge dwell     ticks with contact on an edge, times the servo's period: the deepest contact's
+///                  point is within kReach of a sharp edge or vertex (runner/sharp_edges.h)
 class ContactLog {
  public:
   static constexpr double kReach = 0.003;  ///< m; a light touch goes 2 mm deep

@@ -11,7 +11,7 @@
 #include <thread>
 #include <vector>
 
-#include "protocols/answer_keys.h"
+#include "protocols/event_codes.h"
 
 namespace palpate::runner::session {
 

@@ -66,15 +66,14 @@ class Preflight {
   std::vector<Step> left_out_;
 };
 
-// Runs the pre-flight of a live session at the console: the servo runs, the experimenter works
-// through the checklist, and no trial has begun.
-
 struct PreflightResult {
   std::vector<std::string> findings;  ///< the checks done and skipped, for the record
   std::vector<std::string> messages;  ///< shown on the console
 };
 
-/// Returns when every step is done or skipped and forces are allowed. For the session's own thread.
+/// Runs the pre-flight of a live session at the console: the servo runs, the experimenter works
+/// through the checklist, and no trial has begun. Returns when every step is done or skipped and
+/// forces are allowed. For the session's own thread.
 /// \param news  messages that the console shows first
 /// \throws EndOfSession
 PreflightResult run_preflight(const LiveStation& station, const std::vector<std::string>& news);

@@ -1,6 +1,5 @@
 #pragma once
-// The record of a live session: its participant, run, notes and trials, and the interface through
-// which the trial loop writes them.
+// The record of a live session: its participant, run, notes and trials.
 
 #include <cstdint>
 #include <optional>
@@ -10,52 +9,13 @@
 #include "data/record.h"
 #include "data/store/store.h"
 #include "protocols/protocol.h"
-#include "rendering/probe.h"
+#include "runner/session/trial_log.h"
 
 namespace palpate::runner::session {
-
-// Pose and velocity of a moving stimulus, as the store keeps them.
-
-inline data::BodyRecord body_record(const rendering::BodyPose& body) {
-  data::BodyRecord out;
-  out.centre = {body.centre.x, body.centre.y, body.centre.z};
-  const Quat& q = body.orientation;
-  out.orientation_wxyz = {q.w, q.x, q.y, q.z};
-  out.velocity = {body.velocity.x, body.velocity.y, body.velocity.z};
-  out.spin = {body.spin.x, body.spin.y, body.spin.z};
-  return out;
-}
-
-inline bool same_body(const data::BodyRecord& a, const data::BodyRecord& b) {
-  return a.centre == b.centre && a.orientation_wxyz == b.orientation_wxyz &&
-         a.velocity == b.velocity && a.spin == b.spin;
-}
 
 /// Converts a protocol to its record: its text, and the contents of
 /// every file that it names.
 data::ProtocolInfo info_of(const protocols::Protocol& protocol);
-
-// The trial log: the trial loop's interface to the database.
-
-/// Where a session writes its trials, before and after each is shown.
-class TrialLog {
- public:
-  virtual ~TrialLog() = default;
-  /// Before the stimulus is shown. \return the attempt's number, 1, 2, ...
-  virtual int begin(const data::TrialRecord& planned, std::int64_t began_ns) = 0;
-  /// After the answer; when this returns, the trial is durable.
-  virtual void finish(const data::TrialRecord& record) = 0;
-  /// The trial will be shown again.
-  virtual void cut_off(const std::string& reason) = 0;
-  /// Stores an answer to a question of a page of version 2; when this returns, it is durable. A log
-  /// without pages ignores it.
-  virtual void answered(const data::PageAnswer& /*answer*/) {}
-  /// Stores an event of the session, as JSON. A log without notes ignores it. \param at_ns  session
-  /// clock
-  virtual void note(std::int64_t /*at_ns*/, const std::string& /*text*/) {}
-  /// The answers of this session that are in force; their questions are not asked again.
-  virtual std::vector<data::PageAnswer> answers() { return {}; }
-};
 
 /// The log of a live session. A new participant is enrolled, and takes a number of the
 /// counterbalancing, with the first answer to a page, note of the experimenter or trial, not when

@@ -16,9 +16,9 @@
 #include "protocols/tasks/levels.h"
 #include "rendering/fields.h"
 #include "runner/participants/seen_record.h"
+#include "runner/session/body_record.h"
 #include "runner/session/reach_measures.h"
 #include "runner/session/recorded_outcome.h"
-#include "runner/session/run_record.h"
 
 namespace palpate::runner::session {
 namespace {

@@ -27,6 +27,7 @@
 #include "runner/session/run_record.h"
 #include "runner/session/session.h"
 #include "runner/session/socket_advisor.h"
+#include "runner/session/trial_log.h"
 
 namespace palpate::runner::session {
 namespace {

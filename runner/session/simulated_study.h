@@ -17,13 +17,10 @@
 #include "runner/participants/simulated_settings.h"
 #include "runner/participants/task_participant.h"
 #include "runner/scene_builder.h"
-#include "runner/session/run_record.h"
 #include "runner/session/socket_advisor.h"
+#include "runner/session/trial_log.h"
 
 namespace palpate::runner::session {
-
-// One session of one simulated participant: the trial loop, servo and renderers of a live session
-// with a virtual clock. simulate_study() stores its records; a sweep keeps only summary figures.
 
 /// Data that the sessions of a study share, read only.
 struct SimulatedStudy {
@@ -52,6 +49,8 @@ struct SimulatedSession {
   std::vector<data::TrialRecord> completed = {};  ///< in earlier runs; only of a task that learns
 };
 
+/// One session of one simulated participant: the trial loop, servo and renderers of a live session
+/// with a virtual clock. simulate_study() stores its records; a sweep keeps only summary figures.
 /// \param halting  asked between trials; a shown trial is finished
 void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& session,
                            TrialLog& log, const std::function<bool()>& halting);

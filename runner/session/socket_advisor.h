@@ -38,8 +38,6 @@
 
 namespace palpate::runner::session {
 
-// An external program that proposes the levels of adaptive blocks.
-
 /// A program's wish for the next trial: one of these.
 struct Proposal {
   std::optional<double> level = std::nullopt;
@@ -47,6 +45,7 @@ struct Proposal {
   bool finished = false;             ///< the block ends
 };
 
+/// An external program that proposes the levels of adaptive blocks.
 class LevelAdvisor {
  public:
   virtual ~LevelAdvisor() = default;

@@ -18,6 +18,7 @@
 #include "runner/session/markers.h"
 #include "runner/session/run_record.h"
 #include "runner/session/socket_advisor.h"
+#include "runner/session/trial_log.h"
 #include "runner/sound/player.h"
 
 namespace palpate::runner::session {

@@ -23,8 +23,6 @@ namespace palpate::runner::station {
 /// P02.
 std::vector<std::string> near_codes(const std::string& code, const std::vector<std::string>& known);
 
-// The due session, the trial to resume from, and a withdrawal of the participant.
-
 /// The session that is due or was requested. \throws UsageError: none is due, the requested one
 /// does not exist, or the participant has withdrawn.
 int choose_session(data::Store& store, const data::Participant& participant,
@@ -58,11 +56,10 @@ struct Admission {
 /// UsageError: the answer was no, or the options contradict the database; InputError; StoreError.
 Admission admit(const RunSettings& settings);
 
-// The record of a run as a whole.
-
 /// This moment on the session clock and in UTC.
 data::ClockStamp stamp_now(servo::Clock& clock);
 
+/// The record of a run as a whole.
 /// \param joystick  whether the protocol maps one, and a window looks at it
 data::RunInfo run_info(const RunSettings& settings, const servo::DeviceCapabilities& device,
                        int session, const data::ClockStamp& began, bool joystick);

@@ -10,14 +10,13 @@
 
 namespace palpate::runner::station {
 
-// Both give a note for the record: the lag is accepted; empty: it is short, or unknown.
-
 /// Of frames, in the newest run of the database that has any.
+/// \return a note for the record: the lag is accepted; empty: it is short, or unknown
 /// \throws UsageError: the lag is too long, and the protocol does not accept it
 std::string check_seen_lag(data::Store& store, const protocols::Protocol& protocol);
 
 /// Of contacts: as measured at the sound card, or else in the newest run of the database.
-/// \throws UsageError: likewise
+/// \return, \throws as check_seen_lag
 std::string check_sound_lag(data::Store& store, const protocols::Protocol& protocol,
                             const RunSettings& settings);
 

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "data/base/text.h"
-#include "protocols/answer_keys.h"
+#include "protocols/event_codes.h"
 #include "protocols/tasks/texts.h"
 #include "runner/display/text_display.h"
 #include "runner/servo/realtime.h"

@@ -10,8 +10,7 @@
 
 namespace palpate::runner::study {
 
-// The columns of a schedule: those of an exported trials.csv that are known before the response.
-
+/// The columns of a schedule: those of an exported trials.csv that are known before the response.
 inline std::vector<std::string> schedule_columns() {
   return {"participant_id", "session",         "block",          "trial",         "renderer",
           "shape",          "orientation_w",   "orientation_x",  "orientation_y", "orientation_z",

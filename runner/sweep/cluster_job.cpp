@@ -4,6 +4,7 @@
 #include <nlohmann/json.hpp>
 
 #include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 #include "runner/output/outputs.h"
 
 namespace palpate::runner::sweep {

@@ -35,9 +35,7 @@ struct PlannedSweep {
   data::SweepPlan plan;
 };
 
-// One point of a sweep: a study in memory, and its figures as `analyze` defines them.
-
-/// The inputs of a point.
+/// The inputs of a point of a sweep, which is a study in memory.
 struct Sweep {
   const SweptStudy& study;
   const Design& design;
@@ -47,7 +45,9 @@ struct Sweep {
 /// The point's study, not yet run.
 PointStudy study_of_point(const Sweep& sweep, std::int64_t point);
 
-/// Runs a point. An exception is the reason why the point failed. \return none: it was stopped
+/// Runs a point; its figures are as `analyze` defines them. An exception is the reason why the
+/// point failed.
+/// \return none: it was stopped
 std::optional<data::SweepRow> run_point(const Sweep& sweep, std::int64_t point,
                                         const std::atomic<bool>& stop);
 

@@ -15,6 +15,7 @@
 #include "data/base/words.h"
 #include "data/stored_protocol.h"
 #include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 #include "runner/participants/simulated_settings.h"
 
 namespace palpate::runner::sweep {

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "protocols/json_document.h"
+#include "protocols/fault_list.h"
 #include "protocols/parse.h"
 #include "protocols/sweep_space.h"
 #include "runner/participants/simulated_settings.h"

@@ -7,7 +7,7 @@
 #include "stimuli/convex_mesh.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/polygon_soup.h"
-#include "stimuli/solids/solid_mesh.h"
+#include "stimuli/solids/gmsh_file.h"
 
 namespace palpate::runner::touch {
 

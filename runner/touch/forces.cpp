@@ -10,6 +10,7 @@
 #include "analysis/input/csv_reader.h"
 #include "protocols/parse.h"
 #include "protocols/protocol.h"
+#include "protocols/scene_spec.h"
 #include "runner/scene_builder.h"
 #include "runner/usage_error.h"
 #include "stimuli/polygon_soup.h"

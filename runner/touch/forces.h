@@ -10,13 +10,12 @@
 #include "protocols/parse.h"
 #include "rendering/probe.h"
 #include "rendering/renderer.h"
+#include "rendering/scene_motion.h"
 #include "runner/output/outputs.h"
 #include "runner/scene_builder.h"
 #include "stimuli/polygon_soup.h"
 
 namespace palpate::runner::touch {
-
-// CSV files: the path of a stylus, read, and the forces along it, written.
 
 inline constexpr const char* kTrajectoryHeader = "t,tip_x,tip_y,tip_z,tail_x,tail_y,tail_z";
 inline constexpr const char* kSideHeader = ",side_x,side_y,side_z";  ///< may follow

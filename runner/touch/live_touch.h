@@ -57,8 +57,7 @@ class RecordedTouch final : public display::TouchSource {
   std::string trouble_;
 };
 
-// The window of `palpate explore`.
-
+/// Of the window of `palpate explore`.
 struct HandsOnSettings {
   std::string scene_path, trajectory;  ///< trajectory: recorded path; empty: a device's
   std::string pictures;                ///< folder for those that are kept; empty: none

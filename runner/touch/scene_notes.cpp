@@ -9,11 +9,13 @@
 #include <utility>
 
 #include "data/base/text.h"
+#include "rendering/bodies/soft/soft_scene.h"
 #include "runner/session/effect_check.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
+#include "stimuli/solids/gmsh_file.h"
 #include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::runner::touch {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "protocols/parse.h"
-#include "rendering/bodies/soft/soft_scene.h"
+#include "rendering/bodies/soft/soft_object.h"
 #include "runner/scene_builder.h"
 
 namespace palpate::runner::touch {

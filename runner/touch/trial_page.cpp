@@ -21,12 +21,14 @@
 
 #include "analysis/report/html_page.h"
 #include "analysis/text.h"
+#include "data/base/base64.h"
 #include "data/base/text.h"
 #include "rendering/renderer.h"
 #include "runner/display/scene/drawn_mesh.h"
 #include "runner/display/seen.h"
 #include "runner/safety/fault_signals.h"
 #include "runner/scene_builder.h"
+#include "runner/session/recorded_trial.h"
 #include "runner/session/replay.h"
 #include "stimuli/texture.h"
 

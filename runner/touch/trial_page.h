@@ -8,14 +8,13 @@
 #include <string_view>
 #include <vector>
 
-#include "runner/session/replay.h"
+#include "runner/session/recorded_trial.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::runner::touch {
 
-// The surface of an object for a page: triangles with shared corners.
-
+/// The surface of an object for a page: triangles with shared corners.
 struct PictureMesh {
   std::vector<Vec3> corners;  ///< m, the object's own frame
   std::vector<std::array<std::uint32_t, 3>> triangles;
@@ -42,8 +41,7 @@ struct TrialPage {
 /// \throws std::invalid_argument if protocol and record disagree
 TrialPage trial_page(const std::vector<WatchedTrial>& trials, bool compare);
 
-// Texts that the build embeds.
-
+// Texts that the build embeds:
 std::string_view watch_css();  ///< watch.css
 std::string_view watch_js();   ///< drawing.js to watch.js
 std::string_view live_page();  ///< the watchers' page of palpate serve: live.html with its script

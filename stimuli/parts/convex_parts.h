@@ -15,8 +15,7 @@ class ConvexMesh;
 /// m^3
 double volume_of(const ConvexMesh& mesh);
 
-// The groups of a mesh file that are solids of their own.
-
+/// A group of a mesh file that is a solid of its own.
 struct SolidGroup {
   std::string name;  ///< for messages: "group 'left'"
   PolygonSoup soup;  ///< its own vertices only
@@ -44,9 +43,7 @@ std::vector<ConvexMesh> convex_parts(const PolygonSoup& soup);
 /// The same; nullopt where something is not convex or not a solid.
 std::optional<std::vector<ConvexMesh>> convex_as_it_is(const PolygonSoup& soup);
 
-// Overlaps of convex parts. One frame for all parts, SI units.
-
-/// m^3; of the intersection. 0 for bodies that abut.
+/// m^3; of the intersection of two parts in one frame. 0 for bodies that abut.
 double common_volume(const ConvexMesh& a, const ConvexMesh& b);
 
 /// One sentence for each two groups of a mesh file that overlap by more than a millionth of the

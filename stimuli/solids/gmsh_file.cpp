@@ -1,3 +1,5 @@
+#include "stimuli/solids/gmsh_file.h"
+
 #include <algorithm>
 #include <array>
 #include <bit>

@@ -13,7 +13,8 @@
 
 #include "rendering/probes.h"
 #include "rendering/tick.h"
-#include "runner/evidence/verification/random_solids.h"
+#include "runner/evidence/verification/random_draws.h"
+#include "runner/evidence/verification/surface_stroke.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"

@@ -19,8 +19,8 @@
 #include "runner/evidence/accuracy/local_depths.h"
 #include "runner/evidence/accuracy/methods.h"
 #include "runner/evidence/tick_meters.h"
-#include "runner/evidence/verification/random_solids.h"
 #include "runner/evidence/verification/reference.h"
+#include "runner/evidence/verification/surface_stroke.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "protocols/parse.h"
-#include "runner/evidence/verification/random_solids.h"
+#include "runner/evidence/verification/surface_stroke.h"
 #include "runner/session/session.h"
 #include "tests/bench/unlogged_trial.h"
 

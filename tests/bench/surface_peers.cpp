@@ -26,7 +26,7 @@
 
 #include "rendering/renderer.h"
 #include "runner/evidence/tick_meters.h"
-#include "runner/evidence/verification/random_solids.h"
+#include "runner/evidence/verification/surface_stroke.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"

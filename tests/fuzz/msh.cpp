@@ -8,6 +8,7 @@
 #include <string>
 
 #include "stimuli/convex_mesh.h"
+#include "stimuli/solids/gmsh_file.h"
 #include "stimuli/solids/solid_mesh.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

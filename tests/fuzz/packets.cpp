@@ -13,7 +13,7 @@
 
 #include "protocols/parse.h"
 #include "runner/devices/falcon/boot.h"
-#include "runner/devices/falcon/falcon.h"
+#include "runner/devices/falcon/driver.h"
 #include "runner/devices/falcon/parameters.h"
 
 namespace {

@@ -5,6 +5,8 @@
 #include <iostream>
 
 #include "runner/evidence/verification/search.h"
+#include "runner/evidence/verification/union_search.h"
+#include "runner/evidence/verification/union_walks.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace palpate::runner::evidence;

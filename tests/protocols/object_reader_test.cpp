@@ -1,6 +1,8 @@
 // Members of a JSON object by kind: accepted values, values that leave the variable unchanged, and
 // the text and place of faults.
 
+#include "protocols/object_reader.h"
+
 #include <gtest/gtest.h>
 
 #include <cstdint>
@@ -9,7 +11,6 @@
 #include <utility>
 #include <vector>
 
-#include "protocols/json_document.h"
 #include "protocols/parse.h"
 
 namespace palpate::protocols {

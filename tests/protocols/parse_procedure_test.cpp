@@ -4,6 +4,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "protocols/json_document.h"
 #include "protocols/tasks/parse_blocks.h"
 
 namespace palpate::protocols {

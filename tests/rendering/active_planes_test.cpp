@@ -1,12 +1,12 @@
-// The nearest point that half-spaces allow (rendering/union_state.h).
+// The nearest point that half-spaces allow (rendering/active_planes.h).
+
+#include "rendering/active_planes.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <glm/geometric.hpp>
 #include <vector>
-
-#include "rendering/union_state.h"
 
 namespace palpate::rendering {
 namespace {

@@ -17,7 +17,7 @@
 #include "rendering/surface_patch.h"
 #include "rendering/surface_search.h"
 #include "runner/evidence/tick_meters.h"
-#include "runner/evidence/verification/random_solids.h"
+#include "runner/evidence/verification/surface_stroke.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/orientation.h"
 #include "stimuli/polygon_soup.h"

@@ -21,7 +21,7 @@
 #include "stimuli/primitives.h"
 #include "tests/shared/random_polyhedron.h"
 #include "tests/stimuli/concave_solids.h"
-#include "tests/stimuli/mesh_invariants.h"
+#include "tests/stimuli/surface_invariants.h"
 
 namespace palpate::stimuli {
 namespace {

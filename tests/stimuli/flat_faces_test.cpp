@@ -9,11 +9,13 @@
 #include <utility>
 
 #include "data/base/random.h"
-#include "stimuli/coplanar.h"
 #include "stimuli/orientation.h"
+#include "stimuli/side_groups.h"
+#include "stimuli/weld.h"
 #include "tests/shared/random_polyhedron.h"
 #include "tests/stimuli/concave_solids.h"
-#include "tests/stimuli/mesh_invariants.h"
+#include "tests/stimuli/single_precision.h"
+#include "tests/stimuli/surface_invariants.h"
 
 namespace palpate::stimuli {
 namespace {

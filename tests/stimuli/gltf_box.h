@@ -2,10 +2,11 @@
 // A box as a glTF file, put together from the specification.
 
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <string>
 
-#include "data/base/text.h"
+#include "data/base/base64.h"
 
 namespace palpate::stimuli::gltf {
 

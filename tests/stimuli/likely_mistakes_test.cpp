@@ -1,7 +1,6 @@
 #include <gtest/gtest.h>
 
 #include "data/base/text.h"
-#include "stimuli/convex_mesh.h"
 #include "stimuli/mesh_file.h"
 
 namespace palpate::stimuli {

@@ -18,7 +18,7 @@
 #include "stimuli/primitives.h"
 #include "tests/shared/random_polyhedron.h"
 #include "tests/shared/temporary_folder.h"
-#include "tests/stimuli/mesh_invariants.h"
+#include "tests/stimuli/single_precision.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -3,8 +3,8 @@
 #include <cstdint>
 #include <string>
 
+#include "data/base/base64.h"
 #include "data/base/random.h"
-#include "data/base/text.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/mesh_formats.h"

@@ -1,5 +1,5 @@
 #pragma once
-// All invariants of ConvexMesh and ClosedSurface, checked exhaustively.
+// All invariants of ConvexMesh, checked exhaustively.
 
 #include <gtest/gtest.h>
 
@@ -8,26 +8,12 @@
 #include <cstdint>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <set>
-#include <tuple>
 #include <utility>
 #include <vector>
 
-#include "stimuli/closed_surface.h"
 #include "stimuli/convex_mesh.h"
 
 namespace palpate::stimuli::checks {
-
-/// Rounded to single precision. One number at a time through memory: GCC 12 vectorises
-/// Vec3(glm::vec3(v)) at -O2 and then folds the two conversions into none.
-inline Vec3 single_precision(const Vec3& place) {
-  Vec3 rounded;
-  for (int axis = 0; axis < 3; ++axis) {
-    const volatile auto single = static_cast<float>(place[axis]);
-    rounded[axis] = single;
-  }
-  return rounded;
-}
 
 /// Where side `k` of a facet begins.
 inline std::uint32_t corner_of(const ConvexMesh& mesh, std::uint32_t facet, std::uint32_t k) {
@@ -124,34 +110,6 @@ inline void expect_convex_mesh(const ConvexMesh& mesh, double stands_out) {
   }
   ASSERT_LE(farthest, mesh.radius());
   ASSERT_GE(farthest, mesh.radius() * (1 - 1e-12));
-}
-
-/// The guarantees of closed_surface.h for every surface.
-inline void expect_closed(const ClosedSurface& surface) {
-  std::vector<char> used(surface.vertices.size(), 0);
-  ASSERT_EQ(surface.across.size(), surface.triangles.size());
-  for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
-    const auto& corners = surface.triangles[t];
-    const Vec3 area = glm::cross(surface.vertices[corners[1]] - surface.vertices[corners[0]],
-                                 surface.vertices[corners[2]] - surface.vertices[corners[0]]);
-    EXPECT_GT(glm::length(area), 0) << t;
-    for (std::size_t k = 0; k < 3; ++k) {
-      used.at(corners[k]) = 1;
-      const std::uint32_t n = surface.across[t][k];
-      const auto& other = surface.triangles.at(n);
-      const std::uint32_t from = corners[(k + 1) % 3], to = corners[k];
-      bool back = false;
-      for (std::size_t j = 0; j < 3; ++j)
-        back |= other[j] == from && other[(j + 1) % 3] == to && surface.across[n][j] == t;
-      EXPECT_TRUE(back) << t << " over " << k;
-    }
-  }
-  EXPECT_EQ(std::count(used.begin(), used.end(), 0), 0);
-  const auto before = [](const Vec3& a, const Vec3& b) {
-    return std::tie(a.x, a.y, a.z) < std::tie(b.x, b.y, b.z);
-  };
-  std::set<Vec3, decltype(before)> places(surface.vertices.begin(), surface.vertices.end(), before);
-  EXPECT_EQ(places.size(), surface.vertices.size());
 }
 
 }  // namespace palpate::stimuli::checks

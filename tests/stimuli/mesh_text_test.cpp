@@ -8,7 +8,6 @@
 #include <string>
 #include <vector>
 
-#include "stimuli/convex_mesh.h"
 #include "stimuli/mesh_formats.h"
 
 namespace palpate::stimuli {

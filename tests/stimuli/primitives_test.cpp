@@ -11,6 +11,7 @@
 
 #include "stimuli/convex_mesh.h"
 #include "stimuli/polygon_soup.h"
+#include "stimuli/signed_distance.h"
 
 namespace palpate::stimuli {
 namespace {

@@ -8,6 +8,7 @@
 #include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "stimuli/shapes.h"
+#include "stimuli/signed_distance.h"
 
 namespace palpate::stimuli {
 namespace {

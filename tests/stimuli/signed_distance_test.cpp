@@ -1,4 +1,6 @@
 
+#include "stimuli/signed_distance.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>

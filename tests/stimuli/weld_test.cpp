@@ -1,5 +1,7 @@
 // Welded points, against a check of every pair.
 
+#include "stimuli/weld.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,7 +12,6 @@
 #include <vector>
 
 #include "data/base/random.h"
-#include "stimuli/closed_surface.h"
 #include "tests/shared/rounds.h"
 
 namespace palpate::stimuli {

@@ -26,7 +26,6 @@
 #include "data/files/file_permissions.h"
 #include "data/store/store.h"
 #include "data/store/sweep_file.h"
-#include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "protocols/protocol.h"
 #include "protocols/tasks/block_order.h"

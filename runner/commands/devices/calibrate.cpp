@@ -14,6 +14,7 @@
 #include "runner/commands/devices/devices.h"
 #include "runner/commands/shared/command.h"
 #include "runner/devices/falcon/calibration.h"
+#include "runner/devices/falcon/driver.h"
 #include "runner/devices/falcon/falcon.h"
 #include "runner/devices/falcon/stylus_from_ends.h"
 #include "runner/devices/registry.h"

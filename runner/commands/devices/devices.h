@@ -1,5 +1,6 @@
 #pragma once
-// The parts of the devices command: --calibrate, --sound and --report.
+// Parts of the devices command: --calibrate, --sound, and --report FILE, the facts about a lab's
+// device that palpate's developers need, in one file without personal data.
 
 #include <boost/program_options.hpp>
 #include <nlohmann/json.hpp>
@@ -27,9 +28,6 @@ std::string now_utc();
 /// \return the exit status
 int measure_sound(const std::string& device, const std::string& input,
                   const std::string& calibration, nlohmann::ordered_json& report);
-
-// `palpate devices --report FILE`: the facts about a lab's device that palpate's developers need,
-// in one file without personal data.
 
 /// Kernel, processor and real-time rights, without names of computers or users.
 nlohmann::ordered_json machine_facts();

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/statistics/pilot.h"
 #include "analysis/statistics/plan.h"
 #include "analysis/statistics/power.h"
 #include "runner/commands/shared/command.h"
@@ -25,16 +26,15 @@ struct PlanOptions {
 /// The options that a plan's powers depend on.
 void add_plan_options(CommandLine& line, PlanOptions& options);
 
-// Each throws UsageError.
-
-/// The pilot's model, or the paper's shapes with the given figures.
+/// The pilot's model, or the paper's shapes with the given figures. \throws UsageError
 analysis::Pilot starting_point(const PlanOptions& options,
                                const boost::program_options::variables_map& values);
 
-/// The pilot's model, moved from, with the given figures and effects.
+/// The pilot's model, moved from, with the given figures and effects. \throws UsageError
 analysis::StudyModel model_of(analysis::Pilot& pilot, const PlanOptions& options,
                               const boost::program_options::variables_map& values);
 
+/// \throws UsageError
 analysis::PlanSettings settings_of(const PlanOptions& options,
                                    const boost::program_options::variables_map& values);
 

@@ -11,6 +11,8 @@
 #include "data/store/store.h"
 #include "runner/commands/shared/command.h"
 #include "runner/output/outputs.h"
+#include "runner/session/recorded_trial.h"
+#include "runner/session/replay_comparison.h"
 
 namespace palpate::runner::commands {
 

@@ -17,7 +17,7 @@
 #include "data/base/text.h"
 #include "data/store/store.h"
 #include "data/store/task_text.h"
-#include "protocols/answer_keys.h"
+#include "protocols/event_codes.h"
 #include "protocols/session_plan.h"
 #include "protocols/tasks/block_order.h"
 #include "protocols/tasks/texts.h"

@@ -11,6 +11,7 @@
 #include "data/base/text.h"
 #include "data/files/atomic_file.h"
 #include "data/store/store.h"
+#include "protocols/fault_list.h"
 #include "protocols/json_document.h"
 #include "protocols/session_plan.h"
 #include "runner/commands/run/settings.h"

@@ -34,9 +34,8 @@ std::vector<int> numbers_of_groups(const std::string& text, const GroupAssignmen
 /// \throws UsageError: the path is not a socket, or the time is out of range
 void check_advisor(const std::string& path, double time_out);
 
-// The share of the work of this process: points of a sweep, or participants of a study.
-
-/// Shard `number` of `count`, from 1.
+/// The share of the work of this process, of points of a sweep or participants of a study: shard
+/// `number` of `count`, from 1.
 struct Shard {
   std::int64_t number = 1, count = 1;
   /// Its items are consecutive: after `first` (from 0) up to `last`.
@@ -50,8 +49,6 @@ struct Shard {
 /// "2/8"; "auto": from the variables of a Slurm array task, SLURM_ARRAY_TASK_ID, _COUNT and _MIN.
 /// \param variable  the value of an environment variable, or null. \throws UsageError
 Shard parse_shard(const std::string& text, const std::function<const char*(const char*)>& variable);
-
-// Checks before a study is simulated.
 
 /// Adds --participant-version. Without the option `version` stays unchanged.
 void add_participant_version(CommandLine& line, int& version);

@@ -11,6 +11,7 @@
 #include "data/base/cell_name.h"
 #include "data/base/text.h"
 #include "data/base/words.h"
+#include "protocols/fault_list.h"
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "protocols/schedule.h"

@@ -17,6 +17,7 @@
 
 #include "data/base/json_text.h"
 #include "protocols/json_document.h"
+#include "protocols/object_reader.h"
 #include "runner/devices/falcon/parameters.h"
 
 namespace palpate::runner::devices::falcon {

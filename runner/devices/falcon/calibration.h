@@ -13,10 +13,9 @@
 
 namespace palpate::runner::devices::falcon {
 
-// Dialog with the experimenter during a guided procedure. It never blocks: the devices need a tick
-// every millisecond while a question waits for its answer.
-
-/// Shows texts and questions, and polls for answers.
+/// Dialog with the experimenter during a guided procedure: shows texts and questions, and polls for
+/// answers. It never blocks: the devices need a tick every millisecond while a question waits for
+/// its answer.
 class Guide {
  public:
   virtual ~Guide() = default;
@@ -101,10 +100,9 @@ CalibrationVerdict judge_pair(const Calibration& calibration, const std::string&
 /// The more severe state, with both texts.
 CalibrationVerdict both(const CalibrationVerdict& a, const CalibrationVerdict& b);
 
-// Calibration of a Falcon's force with known weights. The device has no force sensor, but a
-// position controller can hold its grip: the weight equals the commanded force with it minus that
-// without it. The grip moves slowly up and down during each measurement, so that friction cancels.
-
+/// Calibration of a Falcon's force with known weights. The device has no force sensor, but a
+/// position controller can hold its grip: the weight equals the commanded force with it minus that
+/// without it. The grip moves slowly up and down during each measurement, so that friction cancels.
 struct WeighingSettings {
   std::vector<double> weights = {0.1, 0.2, 0.4};  ///< kg, each hung at the grip in turn
   double gravity = 9.80665;                       ///< m/s^2

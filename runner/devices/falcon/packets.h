@@ -55,12 +55,11 @@ class PacketStream {
   std::uint64_t dropped_ = 0;
 };
 
-// Serial numbers come from the device, so they are untrusted text that is printed, stored and
-// compared with files.
-
 inline constexpr std::size_t kMaxSerial = 32;  ///< characters
 
-/// Keeps letters, digits, '.', '_' and '-', replaces others by '_', truncates to kMaxSerial.
+/// A serial number comes from the device, so it is untrusted text that is printed, stored and
+/// compared with files. Keeps letters, digits, '.', '_' and '-', replaces others by '_', truncates
+/// to kMaxSerial.
 /// \return "": only blanks and zeros
 std::string clean_serial(std::span<const std::uint8_t> text);
 

@@ -69,9 +69,7 @@ class StylusFromEnds {
 
 namespace palpate::runner::devices::falcon {
 
-// Registration: the relative pose of two Falcons that hold a stylus, from points that both have
-// visited.
-
+/// Of the relative pose of two Falcons that hold a stylus, from points that both have visited.
 struct RegistrationSettings {
   double stylus_length = 0.12;  ///< m, between the centres of the grips on the stylus
   /// Vector from the tip's grip to the tail's while points are taken, m, tip's frame: zero with the

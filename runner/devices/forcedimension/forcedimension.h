@@ -12,12 +12,10 @@
 
 namespace palpate::runner::devices::forcedimension {
 
-// The functions of Force Dimension's library, loaded at run time: it is proprietary and is
-// installed by the lab. The prototypes were written from its public documentation (SDK 3.7 to
-// 3.17).
-
-/// `id` is the number returned on opening a device. Negative results are errors unless stated
-/// otherwise. SI units; frame: x to the user, y right, z up.
+/// The functions of Force Dimension's library, loaded at run time: it is proprietary and is
+/// installed by the lab. The prototypes were written from its public documentation (SDK 3.7
+/// to 3.17). `id` is the number returned on opening a device. Negative results are errors unless
+/// stated otherwise. SI units; frame: x to the user, y right, z up.
 struct Library {
   /// \param path  of libdrd or libdhd; empty: search $FDSDK and $FORCEDIM_SDK, then the loader's
   ///              paths. \throws std::runtime_error naming the paths or the missing function

@@ -1,6 +1,8 @@
 #pragma once
-// A Haply Inverse3, Inverse3x or Minverse, with or without a Verse Grip, through the maker's
-// Inverse Service. Not tested on hardware: runner/README.md lists the uncertainties.
+// A Haply Inverse3, Inverse3x or Minverse, with or without a Verse Grip, through the JSON of the
+// maker's Inverse Service (3.1 to 3.5), WebSocket on port 10001, according to its documentation and
+// public clients. Every received message is answered by one. Not tested on hardware:
+// runner/README.md lists the uncertainties.
 
 #include <atomic>
 #include <cstdint>
@@ -19,9 +21,6 @@
 #include "stimuli/vec.h"
 
 namespace palpate::runner::devices::haply {
-
-// The JSON of Haply's Inverse Service (3.1 to 3.5), WebSocket on port 10001, according to its
-// documentation and public clients. Every received message is answered by one.
 
 /// The key under which a service expects a force. The service ignores unknown keys without an
 /// error.

@@ -14,9 +14,6 @@
 
 namespace palpate::runner::devices::touch {
 
-// The functions of OpenHaptics' libHD, loaded at run time: it is proprietary and is installed by
-// the lab. Prototypes and numbers were written from its public documentation.
-
 using Handle = unsigned;
 inline constexpr Handle kNoHandle = 0xFFFFFFFF;
 
@@ -26,7 +23,9 @@ struct Error {
   Handle device;
 };
 
-/// Frame: x right, y up, z to the user. Millimetres, newtons.
+/// The functions of OpenHaptics' libHD, loaded at run time: it is proprietary and is installed by
+/// the lab. Prototypes and numbers were written from its public documentation. Frame: x right, y
+/// up, z to the user. Millimetres, newtons.
 struct Library {
   /// Loads it once for the whole process and never unloads it: loading it again fails.
   /// \param path  empty: the loader's paths. \throws std::runtime_error naming the paths tried or

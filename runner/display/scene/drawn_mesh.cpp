@@ -13,6 +13,7 @@
 #include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "stimuli/shapes.h"
+#include "stimuli/solids/gmsh_file.h"
 #include "stimuli/solids/solid_mesh.h"
 #include "stimuli/texture.h"
 

@@ -10,6 +10,7 @@
 #include <glm/gtc/quaternion.hpp>
 #include <span>
 
+#include "rendering/bodies/soft/soft_scene.h"
 #include "rendering/tool.h"
 #include "runner/display/scene/picture.h"
 #include "stimuli/shapes.h"

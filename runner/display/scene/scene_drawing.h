@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "rendering/bodies/soft/soft_scene.h"
+#include "rendering/bodies/soft/soft_object.h"
 #include "rendering/scene.h"
 #include "rendering/tool.h"
 #include "runner/display/scene/camera.h"
@@ -36,9 +36,8 @@ struct LabelBox {
 /// first. Hides labels of things outside the picture and labels without room.
 void place_labels(std::vector<LabelBox>& boxes, const glm::vec2& picture);
 
-// Matrices that make rods, arrows and balls of the unit cylinder, cone and sphere.
-
-/// Maps the unit z axis to `from`...`to`, and scales x and y by `radius`.
+/// Matrix that makes a rod of the unit cylinder; likewise a ball of the sphere, an arrow of
+/// cylinder and cone. Maps the unit z axis to `from`...`to`, and scales x and y by `radius`.
 glm::mat4 rod_place(const glm::vec3& from, const glm::vec3& to, float radius);
 /// The radius with which the rod is drawn.
 float radius_seen(const DrawnRod& rod, const Camera& camera);
@@ -53,9 +52,8 @@ ArrowPlaces arrow_places(const glm::vec3& from, const glm::vec3& to, float radiu
 /// Points along the arc; the last three steps are its head.
 std::vector<glm::vec3> points_of(const DrawnTurn& turn);
 
-// The tool on the stylus, as the console's view draws it. Virtual frame, m.
-
-/// Stylus and segments of one drawn tool: that in the hand, or the ideal tool.
+/// The tool on the stylus, as the console's view draws it: that in the hand, or the ideal tool.
+/// Virtual frame, m.
 struct DrawnTool {
   rendering::LineProbe stylus;
   std::vector<rendering::LineProbe> segments;  ///< without a tool: the stylus alone

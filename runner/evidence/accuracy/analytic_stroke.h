@@ -1,6 +1,6 @@
 #pragma once
-// A hand that strokes an analytic shape at a prescribed depth: the paths on which methods are
-// compared. Frame of the shape, SI units.
+// A hand that strokes an analytic shape at a prescribed depth, the paths on which methods are
+// compared, and a contact of lines with a known solution. Frame of the shape, SI units.
 
 #include <cstdint>
 #include <vector>
@@ -10,15 +10,15 @@
 
 namespace palpate::runner::evidence {
 
-// A rigid cylinder that lies on an elastic layer, which is bonded to a rigid base: plane strain,
-// small strains, no friction. Not for the servo.
-//
-// Hertz's pressure over a strip of half-width a, a^2 = 4 P' R / (pi E*) (Johnson 1985, "Contact
-// mechanics", 4.2), and the deformation of a layer of that thickness under it (Meijers 1968, "The
-// contact problem of a rigid cylinder on an elastic layer", Appl. Sci. Res. 18). The indentation is
-// that of the strip's middle relative to the base, so no logarithmic constant is left to choose.
-// The pressure is that on a half-space, so the result holds for a up to a third of the thickness.
-
+/// A rigid cylinder that lies on an elastic layer, which is bonded to a rigid base: plane strain,
+/// small strains, no friction. Not for the servo.
+///
+/// Hertz's pressure over a strip of half-width a, a^2 = 4 P' R / (pi E*) (Johnson 1985, "Contact
+/// mechanics", 4.2), and the deformation of a layer of that thickness under it (Meijers 1968, "The
+/// contact problem of a rigid cylinder on an elastic layer", Appl. Sci. Res. 18). The indentation
+/// is that of the strip's middle relative to the base, so no logarithmic constant is left to
+/// choose. The pressure is that on a half-space, so the result holds for a up to a third of the
+/// thickness.
 struct LineContact {
   double young = 20000;     ///< Pa
   double poisson = 0;       ///< below 0.5

@@ -1,6 +1,7 @@
 #include "rendering/bodies/moving_scene.h"
 #include "rendering/probe.h"
 #include "rendering/renderer.h"
+#include "rendering/scene_motion.h"
 #include "runner/evidence/accuracy/body_study.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"

@@ -10,7 +10,8 @@
 
 #include "data/base/random.h"
 #include "rendering/bodies/moving_scene.h"
-#include "rendering/bodies/soft/soft_scene.h"
+#include "rendering/bodies/soft/soft_contact.h"
+#include "rendering/bodies/soft/soft_object.h"
 #include "rendering/renderer.h"
 #include "runner/evidence/accuracy/analytic_stroke.h"
 #include "stimuli/convex_mesh.h"

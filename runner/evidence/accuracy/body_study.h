@@ -1,6 +1,7 @@
 #pragma once
 // Bodies that move and collide, against known answers: error and run time of our own step, beside
-// Bullet and ODE if they are found. World frame, SI units.
+// Bullet and ODE if they are found. Also soft bodies against known solutions. Not for the servo.
+// World frame, SI units.
 
 #include <cstddef>
 #include <functional>
@@ -80,9 +81,8 @@ struct BodyTickCost {
 };
 BodyTickCost body_tick_cost(bool quick, const std::function<double()>& now);
 
-// Errors of soft bodies against known solutions, and the cost of a step. Not for the servo.
-
-/// One measured quantity of one solid.
+/// One measured quantity of one soft body: its error against a known solution, and the cost of a
+/// step.
 struct SoftRow {
   std::string name, truth;
   std::size_t nodes = 0, elements = 0;

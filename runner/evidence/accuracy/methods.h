@@ -20,9 +20,8 @@
 
 namespace palpate::runner::evidence {
 
-// The walk of facet_walk.h, rewritten as plainly as possible for any floating-point precision, to
-// measure the cost and gain of single precision. Not for the servo.
-
+/// The walk of facet_walk.h, rewritten as plainly as possible for any floating-point precision, to
+/// measure the cost and gain of single precision. Not for the servo.
 template <class Real>
 class PlainWalk {
  public:
@@ -218,8 +217,6 @@ struct MethodDefinition {
 /// probe is its tip alone.
 std::vector<MethodDefinition> contact_methods();
 
-// The errors of a method against the exact local penetration depths.
-
 /// The distribution of one kind of error over the ticks on which it is defined.
 struct ErrorSpread {
   std::size_t count = 0;
@@ -228,6 +225,7 @@ struct ErrorSpread {
 
 ErrorSpread error_spread(std::vector<double> errors);
 
+/// The errors of a method against the exact local penetration depths.
 struct ErrorSummary {
   std::size_t ticks = 0;    ///< compared
   std::size_t lost = 0;     ///< false negatives: touching, but no contact found; its force is 0

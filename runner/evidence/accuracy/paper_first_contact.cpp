@@ -6,7 +6,7 @@
 
 #include "data/base/random.h"
 #include "rendering/first_contact.h"
-#include "runner/evidence/verification/random_solids.h"
+#include "runner/evidence/verification/random_draws.h"
 #include "runner/evidence/verification/reference.h"
 #include "stimuli/convex_mesh.h"
 

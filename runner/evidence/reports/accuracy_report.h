@@ -16,6 +16,7 @@
 #include "runner/evidence/scenes/scene_study.h"
 #include "runner/evidence/verification/extreme_cases.h"
 #include "runner/evidence/verification/search.h"
+#include "runner/evidence/verification/union_search.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::runner::evidence {

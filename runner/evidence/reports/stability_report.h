@@ -7,6 +7,8 @@
 
 #include "analysis/figures/figures.h"
 #include "runner/evidence/stability/boundary.h"
+#include "runner/evidence/stability/integrators.h"
+#include "runner/evidence/stability/soft_rest.h"
 
 namespace palpate::runner::evidence {
 

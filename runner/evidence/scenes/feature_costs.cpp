@@ -10,10 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "rendering/bodies/soft/soft_scene.h"
 #include "runner/evidence/scenes/meshes.h"
 #include "runner/evidence/tick_meters.h"
-#include "runner/evidence/verification/random_solids.h"
+#include "runner/evidence/verification/surface_stroke.h"
 #include "runner/scene_builder.h"
 #include "runner/touch/forces.h"
 

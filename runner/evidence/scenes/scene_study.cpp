@@ -10,14 +10,14 @@
 #include <utility>
 
 #include "data/base/words.h"
-#include "rendering/bodies/soft/soft_scene.h"
 #include "rendering/tool.h"
 #include "runner/evidence/accuracy/methods.h"
 #include "runner/evidence/accuracy/peers.h"
 #include "runner/evidence/scenes/meshes.h"
 #include "runner/evidence/tick_meters.h"
-#include "runner/evidence/verification/random_solids.h"
+#include "runner/evidence/verification/random_draws.h"
 #include "runner/evidence/verification/surface_reference.h"
+#include "runner/evidence/verification/surface_stroke.h"
 #include "runner/scene_builder.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "rendering/bodies/moving_scene.h"
+#include "rendering/bodies/soft/soft_object.h"
 #include "rendering/bodies/soft/soft_scene.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/parts/convex_parts.h"

@@ -3,20 +3,15 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <complex>
 #include <cstdint>
 #include <cstdio>
-#include <limits>
 #include <memory>
 #include <numbers>
 #include <stdexcept>
 #include <utility>
 #include <vector>
 
-#include "data/base/random.h"
 #include "rendering/bodies/moving_scene.h"
-#include "rendering/bodies/soft/soft_scene.h"
-#include "runner/devices/simulated.h"
 #include "runner/scene_builder.h"
 #include "runner/servo/passivity.h"
 #include "stimuli/closed_surface.h"
@@ -24,7 +19,6 @@
 #include "stimuli/inset.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
-#include "stimuli/solids/solid_mesh.h"
 
 namespace palpate::runner::evidence {
 namespace {
@@ -53,8 +47,6 @@ rendering::SceneObject ridge(double h, double x, const stimuli::Material& materi
                 {{x, 0, -h * std::numbers::sqrt2}, turned_about_y(std::numbers::pi / 4)}, material,
                 index);
 }
-constexpr double kSoftHalf = 0.015, kSoftTick = 0.001;  // m, s
-
 std::vector<rendering::SceneObject> objects_of(ContactCase contact_case, bool ray,
                                                const stimuli::Material& material) {
   constexpr double kHalf = 0.03, kRadius = 0.03, kWall = 0.5, kThick = 0.02;
@@ -257,15 +249,6 @@ double lever2(const LoopCase& loop) {
 double felt_stiffness(const LoopCase& loop, double stiffness) {
   return stiffness * (1 + loop.layer_share) * lever2(loop);
 }
-constexpr int kTicks = 500;
-
-std::vector<double> forces() {
-  Random random(1);
-  std::vector<double> out;
-  out.reserve(kTicks);
-  for (int i = 0; i < kTicks; ++i) out.push_back(4 * random.unit() - 2);
-  return out;
-}
 
 /// A hand, two devices and a renderer in a loop, tick by tick.
 class Loop {
@@ -397,133 +380,6 @@ LoopSettings settings_at(const LoopCase& loop, double stiffness, double damping)
   if (loop.heavy)
     settings.mass = 100 * felt_stiffness(loop, stiffness) / (settings.rate * settings.rate);
   return settings;
-}
-
-constexpr double kTick = 1e-3;  // s
-constexpr int kMostSteps = 1024;
-
-struct State {
-  double x = 0, v = 0;
-};
-
-State explicit_euler(const Oscillator& o, State s, double force, int steps) {
-  const double h = kTick / steps;
-  for (int i = 0; i < steps; ++i) {
-    const double a = (force - o.damping * s.v - o.stiffness * s.x) / o.mass;
-    s = {s.x + h * s.v, s.v + h * a};
-  }
-  return s;
-}
-
-State semi_implicit_euler(const Oscillator& o, State s, double force, int steps) {
-  const double h = kTick / steps;
-  for (int i = 0; i < steps; ++i) {
-    s.v += h * (force - o.damping * s.v - o.stiffness * s.x) / o.mass;
-    s.x += h * s.v;
-  }
-  return s;
-}
-
-State implicit_euler(const Oscillator& o, State s, double force, int steps) {
-  const double h = kTick / steps;
-  const double factor = 1 / (o.mass + h * o.damping + h * h * o.stiffness);
-  for (int i = 0; i < steps; ++i) {
-    s.v = (o.mass * s.v + h * (force - o.stiffness * s.x)) * factor;
-    s.x += h * s.v;
-  }
-  return s;
-}
-
-/// Closed form: two exponentials about the equilibrium, in extended precision.
-class Reference {
- public:
-  explicit Reference(const Oscillator& o) : stiffness_(o.stiffness) {
-    using Complex = std::complex<long double>;
-    const long double half = o.damping / (2.0L * o.mass);
-    const Complex root = std::sqrt(Complex(half * half - o.stiffness / (long double)(o.mass), 0));
-    r1_ = -half + root;
-    r2_ = -half - root;
-    e1_ = std::exp(r1_ * static_cast<long double>(kTick));
-    e2_ = std::exp(r2_ * static_cast<long double>(kTick));
-  }
-  void advance(long double force) {
-    const long double equilibrium = force / stiffness_;
-    const std::complex<long double> x = x_ - equilibrium;
-    const auto c2 = (v_ - r1_ * x) / (r2_ - r1_), c1 = x - c2;
-    x_ = (c1 * e1_ + c2 * e2_).real() + equilibrium;
-    v_ = (c1 * r1_ * e1_ + c2 * r2_ * e2_).real();
-  }
-  double x() const { return static_cast<double>(x_); }
-
- private:
-  long double stiffness_, x_ = 0, v_ = 0;
-  std::complex<long double> r1_, r2_, e1_, e2_;
-};
-
-/// \param make  returns a function that advances by a tick under a force and returns the position
-template <class Make>
-IntegratorRow measure(const Oscillator& o, const char* method, int steps,
-                      const std::vector<double>& inputs, const std::function<double()>& now_ns,
-                      const Make& make) {
-  IntegratorRow row{o.name, method, steps, 0, 0};
-  Reference reference(o);
-  auto mover = make();
-  for (const double force : inputs) {
-    reference.advance(force);
-    const double error = std::abs(mover(force) - reference.x());
-    row.error = std::isfinite(error) ? std::max(row.error, error) : HUGE_VAL;
-    if (!std::isfinite(error)) break;
-  }
-  if (row.error > 1) row.error = HUGE_VAL;  // m: it diverged
-  const int laps = std::max(1, 40 / steps);
-  double best = HUGE_VAL, sink = 0;
-  for (int round = 0; round < 5; ++round) {
-    auto timed = make();
-    const double start = now_ns();
-    for (int lap = 0; lap < laps; ++lap) {
-      for (const double force : inputs) sink += timed(force);
-    }
-    best = std::min(best, (now_ns() - start) / (laps * kTicks));
-  }
-  row.ns_per_tick = sink == 0.123456789 ? 0 : best;  // prevents the compiler from removing the loop
-  return row;
-}
-
-constexpr double kModuli[] = {1e3, 1e4, 1e5, 1e6, 1e7};   // Pa
-constexpr double kRates[] = {62.5, 125, 250, 500, 1000};  // Hz
-constexpr double kSprings[] = {200, 800, 3000};           // N/m
-constexpr int kHeldTicks = 1500, kWatchedTicks = 200;
-constexpr int kLongestHeldTicks = 12500, kLongWatchedTicks = 1000;  // for undamped bodies
-
-rendering::SoftObject slab(const SoftCase& what) {
-  stimuli::SolidMesh mesh = stimuli::mesh_of_box({0.06, 0.06, 2 * kSoftHalf}, {4, 4, 2});
-  std::vector<std::uint32_t> held;
-  for (std::uint32_t i = 0; i < mesh.nodes.size(); ++i) {
-    if (mesh.nodes[i].z < -0.999 * kSoftHalf) held.push_back(i);
-  }
-  const rendering::SoftSettings settings{
-      .material = {.young = what.young, .poisson = what.poisson, .damping = what.damping},
-      .step = 1 / what.rate};
-  return {std::make_shared<const rendering::SoftBody>(std::move(mesh), held, settings),
-          {.radius = what.radius, .stiffness = what.stiffness},
-          0};
-}
-
-struct WorstSwing {
-  double share = 0;
-  bool accepted = false, finite = true;
-};
-
-WorstSwing worst_of(const std::vector<SoftSwing>& map, double young, double rate) {
-  WorstSwing out;
-  for (const SoftSwing& one : map) {
-    if (one.what.young != young || one.what.rate != rate) continue;
-    out.finite = out.finite && one.finite;
-    if (!one.accepted) continue;
-    out.accepted = true;
-    out.share = std::max(out.share, one.swing);
-  }
-  return out;
 }
 
 }  // namespace
@@ -679,155 +535,6 @@ double stiffest_stable(const LoopCase& loop, double damping) {
     (stable(middle) ? low : high) = middle;
   }
   return low;
-}
-
-std::vector<IntegratorRow> compare_integrators(const std::function<double()>& now_ns) {
-  const Oscillator oscillators[] = {{"relaxed hand (400 N/m, 10 N s/m)", 0.1, 10, 400},
-                                    {"stiff (100 kN/m, 1 N s/m)", 0.1, 1, 1e5},
-                                    {"overdamped (1 kN/m, 500 N s/m)", 0.1, 500, 1000}};
-  using Step = State (*)(const Oscillator&, State, double, int);
-  struct Method {
-    const char* name;
-    Step step;
-  };
-  const Method methods[] = {{"explicit", explicit_euler},
-                            {"semi-implicit", semi_implicit_euler},
-                            {"implicit", implicit_euler}};
-  const std::vector<double> inputs = forces();
-  std::vector<IntegratorRow> rows;
-  for (const Oscillator& o : oscillators) {
-    for (const Method& method : methods) {
-      for (int steps = 1; steps <= kMostSteps; steps *= 4) {
-        rows.push_back(measure(o, method.name, steps, inputs, now_ns, [&] {
-          return [&o, step = method.step, steps, s = State()](double force) mutable {
-            s = step(o, s, force, steps);
-            return s.x;
-          };
-        }));
-      }
-    }
-    rows.push_back(measure(o, "exact", 1, inputs, now_ns, [&] {
-      return [spring = devices::SpringDamper(o.mass, o.damping, o.stiffness, kTick),
-              k = o.stiffness, x = Vec3(), v = Vec3()](double force) mutable {
-        const Vec3 equilibrium(force / k, 0, 0);
-        x -= equilibrium;
-        spring.advance(x, v);
-        x += equilibrium;
-        return x.x;
-      };
-    }));
-  }
-  return rows;
-}
-
-SoftSwing press_and_hold(const SoftCase& what) {
-  const rendering::SoftObject object = slab(what);
-  rendering::SoftObjectState state = rendering::initial_state(object);
-  rendering::PlacedTool tool;
-  tool.count = 1;
-  tool.segments[0] = {Vec3(0), Vec3(0, 0, 0.1)};
-  SoftSwing out{.what = what};
-  out.accepted = rendering::coupling_is_stable(
-      {.young = what.young, .poisson = what.poisson, .damping = what.damping}, what.rate);
-  Vec3 at(what.x, what.y, kSoftHalf + what.radius + 0.0005);
-  const double goal = kSoftHalf + what.radius - what.depth, fall = what.speed * kSoftTick;
-  const auto tick = [&] {
-    const double step = std::max(-fall, goal - at.z);
-    at.z += step;
-    const double force = rendering::advance(object, state, at, tool, std::abs(step), kSoftTick).z;
-    out.finite = out.finite && std::isfinite(force);
-    return force;
-  };
-  const auto watch = [&](int ticks) {
-    double low = std::numeric_limits<double>::infinity(), high = -low, sum = 0;
-    for (int i = 0; i < ticks; ++i) {
-      const double force = tick();
-      low = std::min(low, force);
-      high = std::max(high, force);
-      sum += force;
-    }
-    out.force = sum / ticks;
-    out.swing = out.force > 0 ? (high - low) / out.force : std::numeric_limits<double>::infinity();
-  };
-  const int falling = static_cast<int>((at.z - goal) / fall) + 1;
-  int held = kHeldTicks;
-  for (int i = 0; i < falling + held - kWatchedTicks; ++i) tick();
-  watch(kWatchedTicks);
-  // Only its integration damps it: it may oscillate, but not forever.
-  while (out.accepted && what.damping == 0 && !out.settles() && held < kLongestHeldTicks) {
-    watch(kLongWatchedTicks);
-    held += kLongWatchedTicks;
-  }
-  out.held = held * kSoftTick;
-  return out;
-}
-
-std::vector<SoftCase> soft_cases() {
-  std::vector<SoftCase> out;
-  struct Tool {
-    double radius, poisson, damping;
-  };
-  for (const Tool& tool : {Tool{0.002, 0.45, 0.01}, Tool{0.002, 0.45, 0}, Tool{0.01, 0.49, 0.01}}) {
-    for (const double young : kModuli) {
-      for (const double rate : kRates) {
-        for (const double spring : kSprings)
-          out.push_back({young, spring, rate, tool.radius, tool.poisson, tool.damping});
-      }
-    }
-  }
-  return out;
-}
-
-std::vector<SoftCase> soft_cases_elsewhere(std::uint64_t seed) {
-  Random random(seed);
-  std::vector<SoftCase> out = soft_cases();
-  for (SoftCase& one : out) {
-    one.x = 0.04 * (random.unit() - 0.5);
-    one.y = 0.04 * (random.unit() - 0.5);
-    one.depth = 0.001 + 0.005 * random.unit();
-    one.speed = 0.005 * std::pow(40, random.unit());
-  }
-  return out;
-}
-
-std::string soft_map_text(const std::vector<SoftSwing>& map) {
-  std::string out =
-      "Soft bodies: largest oscillation of the force, % of its mean, while the tool is held\n"
-      "still; over springs of 200 to 3000 N/m and tools of 2 and 10 mm, among permitted settings.\n"
-      "Held for 1.5 s; without damping up to 12.5 s, until it varies by at most 1 % in a second.\n"
-      "-: none permitted\n\n"
-      "       Pa ";
-  char cell[48];
-  for (const double rate : kRates) {
-    std::snprintf(cell, sizeof cell, "%9g Hz", rate);
-    out += cell;
-  }
-  out += '\n';
-  int accepted = 0, settled = 0;
-  double slowest = 0;
-  for (const SoftSwing& one : map) {
-    accepted += one.accepted;
-    settled += one.accepted && one.settles();
-    if (one.accepted && one.settles()) slowest = std::max(slowest, one.held);
-  }
-  for (const double young : kModuli) {
-    std::snprintf(cell, sizeof cell, "%9.0f ", young);
-    out += cell;
-    for (const double rate : kRates) {
-      const WorstSwing worst = worst_of(map, young, rate);
-      if (worst.accepted) {
-        std::snprintf(cell, sizeof cell, "%12.2f", 100 * worst.share);
-      } else {
-        std::snprintf(cell, sizeof cell, "%12s", "-");
-      }
-      out += worst.finite ? cell : "   no number";
-    }
-    out += '\n';
-  }
-  std::snprintf(cell, sizeof cell, "\n%d of %d cases", settled, accepted);
-  out += cell;
-  std::snprintf(cell, sizeof cell, " (1 %% at most), the slowest in %.1f s.\n", slowest);
-  return out + " that scenes allow come to rest" + cell;
 }
 
 }  // namespace palpate::runner::evidence

@@ -1,12 +1,10 @@
 #pragma once
-// The stability boundary of a haptic loop: by simulation, and the passivity condition of theory.
+// The stability boundary of a haptic loop: by simulation of the sampled closed loop of hand, two
+// devices at the ends of a stylus and renderer (does a contact come to rest or oscillate?), and the
+// passivity condition of theory. For studies, not for the servo.
 
 #include <cstdint>
-#include <functional>
 #include <optional>
-#include <span>
-#include <string>
-#include <vector>
 
 #include "protocols/protocol.h"
 #include "rendering/reach.h"
@@ -14,9 +12,6 @@
 #include "rendering/scene.h"
 
 namespace palpate::runner::evidence {
-
-// Simulation of the sampled closed loop of hand, two devices at the ends of a stylus and renderer:
-// does a contact come to rest or oscillate? For studies, not for the servo.
 
 /// The hand's impedance at each end of the stylus.
 struct EndImpedance {
@@ -158,70 +153,5 @@ double least_stable_damping(const LoopSettings& settings, const LoopScene& scene
 
 /// Largest stiffness, N/m, at most 10^7, up to which all are stable with this damping of each end.
 double stiffest_stable(const LoopCase& loop, double damping);
-
-// Compares integrators for the simulated hand, to justify the exact one.
-
-/// m x'' = -b x' - k x + F with F held over each tick, the equation of the program's simulated
-/// hand.
-struct Oscillator {
-  std::string name;
-  double mass = 0.1, damping = 0, stiffness = 0;  ///< kg, N s/m, N/m
-};
-
-/// Accuracy and cost of one integrator.
-struct IntegratorRow {
-  std::string oscillator, method;  ///< explicit, semi-implicit, implicit, exact
-  int steps = 1;                   ///< a tick
-  double ns_per_tick = 0;
-  /// m, largest over 500 ticks with a random force at each, against the closed form in extended
-  /// precision; infinite: it diverged.
-  double error = 0;
-};
-
-/// Each method at 1 kHz with 1 to 1024 steps a tick (exact: 1), on three oscillators: a relaxed
-/// hand, a stiff one and an overdamped one. \param now_ns  a clock
-std::vector<IntegratorRow> compare_integrators(const std::function<double()>& now_ns);
-
-// Whether a tool pressed into a soft body comes to rest, although the body has slower steps than
-// the servo: over moduli, contact stiffnesses, rates of the body, and tools.
-
-struct SoftCase {
-  double young = 20000;    ///< Pa
-  double stiffness = 800;  ///< N/m, of the spring between tool and surface
-  double rate = 250;       ///< Hz, of the body's steps
-  double radius = 0.002;   ///< m, of the tool, which is upright on the body
-  double poisson = 0.45;
-  double damping = 0.01;  ///< s, of the body
-  // The path of the tool's tip:
-  double x = 0.0003, y = 0.0002;  ///< m, off the middle of the slab
-  double depth = 0.003;           ///< m, final depth of the virtual tool
-  double speed = 0.02;            ///< m/s, downwards
-};
-
-struct SoftSwing {
-  SoftCase what;
-  double force = 0;      ///< N, mean while it is held
-  double swing = 0;      ///< share of the force: range over the last 0.2 s, or 1 s if undamped
-  double held = 0;       ///< s, duration of holding
-  bool finite = true;    ///< every force was finite
-  bool accepted = true;  ///< scenes allow this rate with this modulus
-  /// Whether it is at rest for a human hand.
-  bool settles() const { return finite && swing <= kAtRest; }
-  static constexpr double kAtRest = 0.01;
-};
-
-/// A slab, 60 x 60 x 30 mm, pressed by an upright tool that is then held still for 1.5 s. If it is
-/// undamped, allowed in scenes and still swings: up to 12.5 s.
-SoftSwing press_and_hold(const SoftCase& what);
-
-/// 1 kPa to 10 MPa, 0.2 to 3 kN/m, 62.5 to 1000 Hz, tools of 2 and 10 mm, with plain and with
-/// nearly incompressible material.
-std::vector<SoftCase> soft_cases();
-/// The same, but each tool presses at a place within 20 mm of the middle, 1 to 6 mm deep, at 5 to
-/// 200 mm/s, drawn with the seed.
-std::vector<SoftCase> soft_cases_elsewhere(std::uint64_t seed);
-
-/// Table of the worst swing for each modulus and rate, with a sentence that sums it up.
-std::string soft_map_text(const std::vector<SoftSwing>& map);
 
 }  // namespace palpate::runner::evidence

@@ -14,7 +14,7 @@
 
 #include "rendering/tool.h"
 #include "runner/evidence/stability/boundary.h"
-#include "runner/evidence/verification/random_solids.h"
+#include "runner/evidence/verification/surface_stroke.h"
 #include "runner/scene_builder.h"
 #include "runner/touch/forces.h"
 

@@ -9,7 +9,7 @@
 
 #include "rendering/probes.h"
 #include "rendering/tick.h"
-#include "runner/evidence/verification/random_solids.h"
+#include "runner/evidence/verification/surface_stroke.h"
 #include "stimuli/convex_mesh.h"
 
 namespace palpate::runner::evidence {

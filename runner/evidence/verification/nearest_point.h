@@ -1,6 +1,8 @@
 #pragma once
-// The point above some planes that is nearest to a given one, found by trying every vertex, edge
-// and face that the planes can form. For checks, not for the servo.
+// By brute force, for the search for wrong ticks: the facet of M (facet_walk.h) through which a
+// probe enters, over all facets and edges of the mesh, and the point above some planes that is
+// nearest to a given one, over every vertex, edge and face that the planes can form. Not for the
+// servo.
 
 #include <cstdint>
 #include <optional>
@@ -16,9 +18,6 @@ class ConvexMesh;
 }
 
 namespace palpate::runner::evidence {
-
-// Through which facet of M (facet_walk.h) a probe enters, by brute force over all facets and edges
-// of the mesh. For the search for wrong ticks.
 
 /// Sizes of the object; depths that differ by less may be those of neighbouring facets of M.
 inline constexpr double kNeighbouringDepths = 1e-4;

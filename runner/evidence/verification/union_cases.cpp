@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "runner/evidence/verification/nearest_point.h"
+#include "runner/evidence/verification/random_draws.h"
 #include "runner/evidence/verification/random_solids.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/orientation.h"

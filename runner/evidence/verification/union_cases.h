@@ -1,6 +1,13 @@
 #pragma once
 // Objects of several convex parts, tools and paths for checks of contact with unions: closed forms
 // (grooves, seams, steps), solids cut into pieces, random clusters. World frame, m.
+//
+// And the brute-force oracle of contact between a rigid tool of line segments and an object that is
+// a union of convex parts: for a fixed orientation the tool is one point, its tip, outside every
+// Minkowski sum M_ij = C_i (+) (-S_j) of part i and mirrored segment j. All half-spaces of all sums
+// are written out at every tick; the point descends to the virtual tip by steepest descent in the
+// free space. Independent of the contact law, the walk and the trees: it shares only the mesh with
+// them. For checks, not for the servo. World frame and SI units unless said otherwise.
 
 #include <memory>
 #include <vector>
@@ -14,13 +21,6 @@ class ConvexMesh;
 }
 
 namespace palpate::runner::evidence {
-
-// Brute-force oracle of contact between a rigid tool of line segments and an object that is a union
-// of convex parts: for a fixed orientation the tool is one point, its tip, outside every Minkowski
-// sum M_ij = C_i (+) (-S_j) of part i and mirrored segment j. All half-spaces of all sums are
-// written out at every tick; the point descends to the virtual tip by steepest descent in the free
-// space. Independent of the contact law, the walk and the trees: it shares only the mesh with them.
-// For checks, not for the servo. World frame and SI units unless said otherwise.
 
 /// A convex part of the object.
 struct OraclePart {

@@ -14,7 +14,7 @@
 #include "analysis/report/plan_record.h"
 #include "analysis/statistics/plan.h"
 #include "analysis/statistics/threshold_plan.h"
-#include "protocols/json_document.h"
+#include "protocols/parse.h"
 
 namespace palpate::analysis {
 namespace {

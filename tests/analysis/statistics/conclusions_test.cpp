@@ -12,6 +12,7 @@
 
 #include "analysis/input/trials.h"
 #include "analysis/statistics/analysis.h"
+#include "analysis/statistics/pilot.h"
 #include "analysis/statistics/plan.h"
 #include "analysis/statistics/power.h"
 

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "analysis/statistics/rm_anova.h"
 #include "data/base/random.h"
 
 namespace palpate::analysis {

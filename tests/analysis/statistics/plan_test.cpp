@@ -17,6 +17,7 @@
 #include "analysis/report/plan_record.h"
 #include "analysis/report/plan_report.h"
 #include "analysis/statistics/analysis.h"
+#include "analysis/statistics/pilot.h"
 #include "analysis/statistics/power.h"
 #include "data/base/random.h"
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "analysis/statistics/psychometric_fit.h"
+#include "analysis/statistics/psychometric_likelihood.h"
 #include "data/base/random.h"
 #include "tests/shared/rounds.h"
 

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "data/export/dataset_description.h"
-#include "data/export/delimited_row.h"
+#include "data/export/exported_columns.h"
 #include "tests/data/export/csv_fixture.h"
 
 namespace palpate::data {

@@ -9,7 +9,7 @@
 #include "data/base/random.h"
 #include "rendering/bodies/body_meetings.h"
 #include "rendering/bodies/body_world.h"
-#include "rendering/probe.h"
+#include "rendering/scene_motion.h"
 #include "runner/evidence/tick_meters.h"
 #include "tests/rendering/bodies/body_fixtures.h"
 

@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "data/base/text.h"
+#include "data/base/utf8.h"
 
 namespace palpate::runner::display {
 namespace {

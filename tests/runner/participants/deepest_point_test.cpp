@@ -1,3 +1,5 @@
+#include "runner/participants/deepest_point.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>

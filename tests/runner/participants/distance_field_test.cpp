@@ -9,9 +9,11 @@
 #include <limits>
 
 #include "data/base/random.h"
+#include "runner/participants/deepest_point.h"
 #include "runner/participants/shape_hypotheses.h"
 #include "runner/participants/shape_lines.h"
 #include "runner/participants/shape_observer.h"
+#include "runner/participants/solid_lines.h"
 #include "stimuli/primitives.h"
 #include "tests/runner/participants/solids.h"
 

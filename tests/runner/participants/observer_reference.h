@@ -8,6 +8,7 @@
 
 #include "runner/participants/shape_observer.h"
 #include "stimuli/primitives.h"
+#include "stimuli/signed_distance.h"
 
 namespace palpate::runner::participants::test {
 

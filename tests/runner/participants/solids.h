@@ -7,6 +7,7 @@
 
 #include "runner/participants/distance_field.h"
 #include "stimuli/closed_surface.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/polygon_soup.h"
 #include "tests/stimuli/concave_solids.h"

@@ -14,6 +14,8 @@
 #include <vector>
 
 #include "data/base/random.h"
+#include "rendering/bodies/soft/soft_build.h"
+#include "rendering/bodies/soft/soft_object.h"
 #include "rendering/bodies/soft/soft_scene.h"
 #include "rendering/renderer.h"
 #include "runner/evidence/tick_meters.h"

@@ -10,7 +10,6 @@
 #include "data/store/store.h"
 #include "protocols/parse.h"
 #include "runner/participants/simulated_settings.h"
-#include "runner/session/replay.h"
 #include "runner/session/simulated_study.h"
 #include "tests/shared/temporary_folder.h"
 

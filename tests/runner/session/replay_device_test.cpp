@@ -1,6 +1,8 @@
 // A recorded trial played back: poses and buttons in order, at the recorded times, then the device
 // is lost.
 
+#include "runner/session/replay_device.h"
+
 #include <gtest/gtest.h>
 
 #include <cstdint>

@@ -20,7 +20,7 @@
 #include "data/base/random.h"
 #include "data/export/csv.h"
 #include "protocols/parse.h"
-#include "runner/session/replay.h"
+#include "runner/session/replay_comparison.h"
 #include "tests/shared/temporary_folder.h"
 
 namespace palpate::runner::session {

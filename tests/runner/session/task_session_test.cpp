@@ -16,9 +16,10 @@
 #include "data/store/store.h"
 #include "protocols/parse.h"
 #include "runner/participants/simulated_settings.h"
-#include "runner/session/replay.h"
+#include "runner/session/replay_comparison.h"
 #include "runner/session/run_record.h"
 #include "runner/session/simulated_study.h"
+#include "runner/session/trial_log.h"
 #include "tests/shared/temporary_folder.h"
 
 namespace palpate::runner::session {

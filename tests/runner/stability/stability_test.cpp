@@ -8,6 +8,8 @@
 #include <utility>
 
 #include "runner/evidence/stability/boundary.h"
+#include "runner/evidence/stability/integrators.h"
+#include "runner/evidence/stability/soft_rest.h"
 #include "runner/servo/passivity.h"
 
 namespace palpate::runner::stability {

@@ -16,8 +16,8 @@
 #include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 #include "tests/stimuli/concave_solids.h"
-#include "tests/stimuli/mesh_invariants.h"
 #include "tests/stimuli/part_checks.h"
+#include "tests/stimuli/single_precision.h"
 
 namespace palpate::stimuli {
 namespace {

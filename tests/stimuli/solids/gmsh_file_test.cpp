@@ -1,5 +1,7 @@
 // Reading of .msh files, good and bad.
 
+#include "stimuli/solids/gmsh_file.h"
+
 #include <gtest/gtest.h>
 
 #include <bit>

@@ -9,7 +9,7 @@
 
 #include "rendering/renderer.h"
 #include "runner/evidence/verification/extreme_cases.h"
-#include "runner/evidence/verification/search.h"
+#include "runner/evidence/verification/tick_audit.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/polygon_soup.h"
 

@@ -11,7 +11,6 @@
 
 #include "runner/evidence/verification/extremes/audited_scene.h"
 #include "runner/evidence/verification/extremes/cases.h"
-#include "runner/evidence/verification/random_solids.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/orientation.h"
 #include "stimuli/primitives.h"

@@ -11,6 +11,8 @@
 
 #include "runner/evidence/verification/extremes/audited_scene.h"
 #include "runner/evidence/verification/extremes/cases.h"
+#include "runner/evidence/verification/random_draws.h"
+#include "runner/evidence/verification/random_paths.h"
 #include "runner/evidence/verification/random_solids.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/orientation.h"

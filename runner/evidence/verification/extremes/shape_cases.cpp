@@ -6,9 +6,10 @@
 
 #include "runner/evidence/verification/extremes/audited_scene.h"
 #include "runner/evidence/verification/extremes/cases.h"
+#include "runner/evidence/verification/random_paths.h"
 #include "runner/evidence/verification/random_solids.h"
-#include "runner/evidence/verification/search.h"
 #include "stimuli/convex_mesh.h"
+#include "stimuli/orientation.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
 

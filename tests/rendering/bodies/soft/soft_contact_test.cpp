@@ -1,5 +1,7 @@
 // A tool on a soft body: Hertz, several contacts, the two rates, and the rules of a servo.
 
+#include "rendering/bodies/soft/soft_contact.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -9,7 +11,8 @@
 #include <vector>
 
 #include "data/base/random.h"
-#include "rendering/bodies/soft/soft_scene.h"
+#include "rendering/bodies/soft/segment_triangle.h"
+#include "rendering/bodies/soft/soft_object.h"
 #include "runner/evidence/tick_meters.h"
 
 namespace palpate::rendering {

@@ -11,7 +11,7 @@
 #include <limits>
 #include <string>
 
-#include "rendering/bodies/soft/soft_scene.h"
+#include "rendering/bodies/soft/soft_build.h"
 
 namespace palpate::rendering {
 namespace {

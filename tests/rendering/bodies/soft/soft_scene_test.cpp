@@ -10,6 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "rendering/bodies/soft/soft_build.h"
+#include "rendering/bodies/soft/soft_object.h"
 #include "rendering/renderer.h"
 #include "runner/evidence/tick_meters.h"
 #include "stimuli/convex_mesh.h"

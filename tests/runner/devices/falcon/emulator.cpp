@@ -6,7 +6,7 @@
 #include <initializer_list>
 
 #include "data/base/random.h"
-#include "runner/devices/falcon/falcon.h"
+#include "runner/devices/falcon/kinematics.h"
 #include "runner/devices/falcon/packets.h"
 #include "runner/devices/falcon/parameters.h"
 

@@ -6,6 +6,7 @@
 #include <memory>
 #include <string>
 
+#include "runner/devices/falcon/driver.h"
 #include "runner/devices/falcon/falcon.h"
 #include "runner/devices/falcon/stylus_from_ends.h"
 #include "tests/runner/devices/falcon/emulator.h"

@@ -9,6 +9,7 @@
 #include "protocols/parse.h"
 #include "runner/devices/falcon/calibration.h"
 #include "runner/devices/falcon/falcon.h"
+#include "runner/devices/falcon/kinematics.h"
 #include "runner/devices/falcon/packets.h"
 #include "tests/shared/temporary_folder.h"
 

@@ -5,6 +5,7 @@
 #include <limits>
 #include <memory>
 
+#include "runner/devices/falcon/driver.h"
 #include "runner/devices/falcon/falcon.h"
 #include "tests/runner/devices/falcon/emulator.h"
 #include "tests/runner/devices/falcon/fake_transport.h"

@@ -1,12 +1,14 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numbers>
 #include <vector>
 
-#include "runner/devices/falcon/falcon.h"
+#include "runner/devices/falcon/kinematics.h"
 #include "runner/devices/falcon/parameters.h"
 
 namespace palpate::runner::devices::falcon {

@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "runner/devices/falcon/boot.h"
-#include "runner/devices/falcon/falcon.h"
+#include "runner/devices/falcon/driver.h"
 #include "runner/devices/falcon/usb.h"
 #include "tests/runner/devices/falcon/emulated_bus.h"
 #include "tests/runner/devices/falcon/preload.h"

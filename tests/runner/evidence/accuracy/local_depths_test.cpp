@@ -13,6 +13,7 @@
 #include "runner/evidence/verification/reference.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
+#include "stimuli/signed_distance.h"
 #include "tests/shared/probe_paths.h"
 
 namespace palpate::runner::evidence {

@@ -1,6 +1,8 @@
 // Random paths have the properties of their kinds: length of the probe, number of ticks, a start
 // outside, steps.
 
+#include "runner/evidence/verification/random_paths.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,7 +12,6 @@
 #include <string>
 #include <vector>
 
-#include "runner/evidence/verification/random_solids.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 

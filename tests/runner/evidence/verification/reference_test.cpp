@@ -7,6 +7,7 @@
 
 #include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
+#include "stimuli/signed_distance.h"
 #include "tests/shared/probe_paths.h"
 #include "tests/shared/random_mesh.h"
 

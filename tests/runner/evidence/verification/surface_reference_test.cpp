@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "rendering/renderer.h"
-#include "runner/evidence/verification/random_solids.h"
+#include "runner/evidence/verification/surface_stroke.h"
 #include "runner/evidence/verification/union_cases.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/primitives.h"

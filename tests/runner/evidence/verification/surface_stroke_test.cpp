@@ -1,12 +1,12 @@
 // The hand of measurements moves as described: speed, depth, place along the stylus, pauses.
 
+#include "runner/evidence/verification/surface_stroke.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 #include <glm/geometric.hpp>
-
-#include "runner/evidence/verification/random_solids.h"
 
 namespace palpate::runner::evidence {
 namespace {

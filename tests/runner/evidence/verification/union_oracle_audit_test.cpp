@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "data/base/random.h"
-#include "runner/evidence/verification/search.h"
 #include "runner/evidence/verification/union_cases.h"
+#include "runner/evidence/verification/union_walks.h"
 
 namespace palpate::runner::evidence {
 namespace {

@@ -9,9 +9,9 @@
 #include <numbers>
 
 #include "rendering/renderer.h"
+#include "runner/evidence/verification/random_paths.h"
 #include "runner/evidence/verification/random_solids.h"
 #include "runner/evidence/verification/reference.h"
-#include "runner/evidence/verification/search.h"
 #include "runner/evidence/verification/union_cases.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/orientation.h"

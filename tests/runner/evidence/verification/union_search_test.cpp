@@ -1,6 +1,8 @@
 // The search over unions of convex parts finds no error in the renderer, and finds the errors of
 // broken ones.
 
+#include "runner/evidence/verification/union_search.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -9,6 +11,7 @@
 #include <utility>
 
 #include "runner/evidence/verification/search.h"
+#include "runner/evidence/verification/union_walks.h"
 
 namespace palpate::runner::evidence {
 namespace {

@@ -1,4 +1,4 @@
-#include "rendering/union_state.h"
+#include "rendering/active_planes.h"
 
 #include <algorithm>
 #include <glm/geometric.hpp>
