@@ -299,10 +299,13 @@ std::string sweep_json(const SweepAnalysis& analysis) {
 
 std::vector<Table> sweep_tables(const SweepAnalysis& analysis) {
   std::vector<Table> out;
-  out.push_back(gains_table(analysis));
+  const auto put = [&out](Table table) {
+    if (!table.rows.empty()) out.push_back(std::move(table));
+  };
+  put(gains_table(analysis));
+  // Where no driver is known, the notes say why.
   for (const Drivers& drivers : analysis.drivers) out.push_back(drivers_table(analysis, drivers));
-  out.push_back(reasons_table(analysis));
-  std::erase_if(out, [](const Table& table) { return table.rows.empty(); });
+  put(reasons_table(analysis));
   return out;
 }
 
