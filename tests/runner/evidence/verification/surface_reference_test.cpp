@@ -13,6 +13,7 @@
 #include "runner/evidence/verification/surface_stroke.h"
 #include "runner/evidence/verification/union_cases.h"
 #include "stimuli/closed_surface.h"
+#include "stimuli/convex_mesh.h"
 #include "stimuli/primitives.h"
 
 namespace palpate::runner::evidence {
