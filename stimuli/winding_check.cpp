@@ -111,7 +111,7 @@ class Tree {
     return box;
   }
 
-  /// The triangles whose boxes meet a box, ascending.
+  /// The triangles whose boxes meet a box.
   std::vector<Index> meeting(const Box& box) const {
     const SmallBox wanted(box);
     std::vector<Index> found, todo{0};
@@ -127,7 +127,6 @@ class Tree {
       for (Index i = node.begin; i < node.end; ++i)
         if (this->box(order_[i]).meets(box)) found.push_back(order_[i]);
     }
-    std::ranges::sort(found);
     return found;
   }
 
@@ -363,28 +362,31 @@ class WindingCheck {
         });
   }
 
-  // The triangles that bound a pocket beside t, from edge to edge, ascending; empty: too many. A
-  // sheet ends where the surface folds back on itself.
-  std::vector<Index> sheet_of(Index t) const {
+  // Numbers the triangles that bound a pocket beside t, from edge to edge: a sheet, which ends
+  // where the surface folds back on itself.
+  Index sheet_of(Index t) {
     constexpr double kFoldsBack = -0.75;  // cosine between normals
-    constexpr std::size_t kMost = 500;
-    std::vector<Index> sheet{t};
-    for (std::size_t i = 0; i < sheet.size(); ++i) {
-      if (sheet.size() > kMost) return {};
-      const Index at = sheet[i];
+    if (sheet_.empty()) sheet_.assign(surface_.triangles.size(), 0);
+    if (sheet_[t] != 0) return sheet_[t];
+    const Index number = sheet_[t] = ++sheets_;
+    std::vector<Index> todo{t};
+    while (!todo.empty()) {
+      const Index at = todo.back();
+      todo.pop_back();
       for (Index k = 0; k < 3; ++k) {
         const Index n = surface_.across[at][k];
-        if (std::ranges::find(sheet, n) == sheet.end() &&
-            glm::dot(glm::normalize(area(at)), glm::normalize(area(n))) > kFoldsBack &&
-            edge_at_pocket(at, k))
-          sheet.push_back(n);
+        if (sheet_[n] != 0 ||
+            glm::dot(glm::normalize(area(at)), glm::normalize(area(n))) <= kFoldsBack ||
+            !edge_at_pocket(at, k))
+          continue;
+        sheet_[n] = number;
+        todo.push_back(n);
       }
     }
-    std::ranges::sort(sheet);
-    return sheet;
+    return number;
   }
 
-  // The triangles within felt_ of a place, ascending.
+  // The triangles whose boxes are within felt_ of a place.
   std::vector<Index> near_to(const Vec3& q) const {
     Box reach;
     reach.add(q - felt_);
@@ -395,31 +397,43 @@ class WindingCheck {
   // m; how deep a pocket is at a place beside one of its walls, t, from which it is wide: a pocket
   // that ends in a floor just beyond the far side. The wall opposite is then of the same sheet, and
   // the depth is the distance to another sheet. Infinity: more than felt_, or no such pocket.
-  double depth_beside_wall(const Vec3& q, Index t) const {
+  double depth_beside_wall(const Vec3& q, Index t) {
     constexpr double kNever = std::numeric_limits<double>::infinity();
-    constexpr int kSteps = 8;
+    constexpr int kSteps = 8, kHalvings = 36;
+    constexpr std::size_t kPlace = 1000,
+                          kMostWork = 300'000'000;  // of a place; in all, some ten seconds
+    if (beside_walls_ > kMostWork) return kNever;
     const Vec3 normal = glm::normalize(area(t));
     double in = 0, out = felt_;
-    while (winding(q + out * normal) < 0)
-      out = 2 * (in = out);  // ends outside of the surface's box
-    for (int i = 0; i < 50; ++i) {
+    while (std::isfinite(out) && winding(q + out * normal) < 0) {
+      in = out;
+      out *= 2;
+    }
+    for (int i = 0; i < kHalvings; ++i) {
       const double middle = 0.5 * (in + out);
       (winding(q + middle * normal) < 0 ? in : out) = middle;
     }
-    const std::vector<Index> sheet = sheet_of(t);
-    const auto distance = [&](Index s, const Vec3& from) {
+    const Index sheet = sheet_of(t);
+    const auto is_farther = [&](Index s, const Vec3& from, double than) {  // by its plane alone
+      const Vec3 n = area(s);
+      return std::abs(glm::dot(n, from - corner(s, 0))) > than * glm::length(n);
+    };
+    const auto way_to = [&](Index s, const Vec3& from) {
       return nearest_on_triangle({corner(s, 0), corner(s, 1), corner(s, 2)}, from) - from;
     };
-    const auto in_sheet = [&](Index s) { return std::ranges::binary_search(sheet, s); };
     const Vec3 opposite = q + out * normal;
-    if (std::ranges::none_of(near_to(opposite), [&](Index s) {
-          return in_sheet(s) && glm::length(distance(s, opposite)) <= 4 * tolerance_;
+    const std::vector<Index> at_opposite = near_to(opposite), at_place = near_to(q);
+    beside_walls_ += kPlace + at_opposite.size() + at_place.size();
+    const double near = 4 * tolerance_;
+    if (std::ranges::none_of(at_opposite, [&](Index s) {
+          return sheet_[s] == sheet && !is_farther(s, opposite, near) &&
+                 glm::length(way_to(s, opposite)) <= near;
         }))
       return kNever;
     double least = kNever;
-    for (const Index s : near_to(q)) {
-      if (in_sheet(s)) continue;
-      const Vec3 way = distance(s, q);
+    for (const Index s : at_place) {
+      if (sheet_[s] == sheet || is_farther(s, q, std::min(least, felt_))) continue;
+      const Vec3 way = way_to(s, q);
       bool within = glm::length(way) < least && glm::length(way) <= felt_;
       for (int i = 1; i < kSteps && within; ++i)
         within = winding(q + i / static_cast<double>(kSteps) * way) < 0;
@@ -432,7 +446,7 @@ class WindingCheck {
   void examine(const Vec3& q, Index t, const char* why) {
     if (winding(q) >= 0) return;
     double depth = depth_of(q, glm::normalize(area(t)));
-    if (depth > felt_) depth = depth_beside_wall(q, t);
+    if (depth > felt_ && accused_ <= kMostAccused) depth = depth_beside_wall(q, t);
     if (depth <= felt_) {
       at_pocket_[t] = 1;
       if (depth <= deepest_.depth) return;
@@ -440,7 +454,7 @@ class WindingCheck {
       deepest_.place = q;
       return;
     }
-    if (accused_ > 32) return;
+    if (accused_ > kMostAccused) return;
     ++accused_;
     if (!truly_negative(q)) return;
     faults_.add("negative", [&] {
@@ -690,7 +704,11 @@ class WindingCheck {
   std::vector<char> at_pocket_;
   Pockets deepest_;
   std::size_t budget_ = 0;
+  static constexpr int kMostAccused = 32;  ///< places looked at closely
   int accused_ = 0;
+  std::vector<Index> sheet_;  ///< number of each triangle's sheet, from 1; 0: none yet
+  Index sheets_ = 0;
+  std::size_t beside_walls_ = 0;  ///< work at places beside walls, in triangles looked at
 };
 
 }  // namespace

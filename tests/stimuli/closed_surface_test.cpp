@@ -427,7 +427,7 @@ PolygonSoup deep_pocket(double depth, double width, double taper) {
   return soup;
 }
 
-TEST(ClosedSurfaceTest, PocketIsAsDeepAsItReachesBeyondTheOtherSide) {
+TEST(ClosedSurfaceTest, PocketDepthIsBeyondOtherSide) {
   for (const double taper : {0.0, 1e-3, 4e-3}) {
     for (const double depth : {1e-6, 1e-5, 3.5e-5}) {
       const stimuli::CleanedSurface cleaned = closed_surface(deep_pocket(depth, 0.01, taper));

@@ -224,7 +224,7 @@ std::vector<touch::TimedPose> compared_path(const std::string& path) {
   std::vector<touch::TimedPose> poses = touch::read_trajectory(path);
   for (const touch::TimedPose& pose : poses) {
     for (const Vec3& end : {pose.probe.tip, pose.probe.tail}) {
-      if (glm::length(end) <= kFarthest) continue;  // false for NaN
+      if (glm::length(end) <= kFarthest) continue;  // not so for NaN
       throw protocols::InputError({{path, "line " + std::to_string(pose.line),
                                     "expected tip and tail within 1e6 m: methods are compared on "
                                     "poses that a hand can have"}});
