@@ -24,7 +24,8 @@ struct Turned {
 // pair bounds a wedge of solid, and the wedges are all of the solid at the edge.
 void link_fan(const std::vector<Vec3>& vertices, const std::vector<std::array<Index, 3>>& triangles,
               const SideGroups::Edge& edge, std::vector<std::array<Index, 3>>& across) {
-  const Vec3 from = vertices[edge.low], along = glm::normalize(vertices[edge.high] - from);
+  const Vec3& from = vertices[edge.low];
+  const Vec3 along = glm::normalize(vertices[edge.high] - from);
   Vec3 x(0);
   std::vector<Turned> fan;
   for (const SideGroups::Side& side : edge.sides) {

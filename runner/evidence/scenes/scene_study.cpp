@@ -597,8 +597,8 @@ class Study {
   }
 
   void add_law(const std::string& name, const std::string& description,
-               std::shared_ptr<const rendering::Scene> springs,
-               std::shared_ptr<const rendering::Scene> whole) {
+               const std::shared_ptr<const rendering::Scene>& springs,
+               const std::shared_ptr<const rendering::Scene>& whole) {
     methods_.push_back({name, description, triangles_in(*whole),
                         [this, springs] { return std::make_unique<Law>(springs, renderer_); },
                         [this, whole] { return std::make_unique<Law>(whole, renderer_); }});
