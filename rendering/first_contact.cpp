@@ -38,8 +38,8 @@ bool segment_meets_box(const Vec3& a, const Vec3& d, const Vec3& low, const Vec3
 /// Calls visit(primitive) for all primitives whose box the segment a .. a + d can meet under a
 /// translation between `low_shift` and `high_shift`.
 template <class Visit>
-void visit_near(const BoundingTree* tree, std::size_t primitives, const Vec3& a, const Vec3& d,
-                const Vec3& low_shift, const Vec3& high_shift, Visit visit) {
+void visit_near(const stimuli::BoundingTree* tree, std::size_t primitives, const Vec3& a,
+                const Vec3& d, const Vec3& low_shift, const Vec3& high_shift, Visit visit) {
   if (!tree) {
     for (std::uint32_t i = 0; i < primitives; ++i) visit(i);
     return;
@@ -49,7 +49,7 @@ void visit_near(const BoundingTree* tree, std::size_t primitives, const Vec3& a,
   stack[top++] = 0;
   while (top > 0) {
     const std::uint32_t index = stack[--top];
-    const BoundingTree::Node& node = tree->nodes()[index];
+    const stimuli::BoundingTree::Node& node = tree->nodes()[index];
     if (!segment_meets_box(a, d, node.box.low - high_shift, node.box.high - low_shift)) continue;
     if (node.count > 0) {
       for (std::uint32_t i = 0; i < node.count; ++i) visit(tree->order()[node.first + i]);
@@ -166,30 +166,27 @@ ContactTrees::ContactTrees(const stimuli::ConvexMesh& mesh, bool with_edges, std
       facet_map_(mesh, small_mesh),
       shallow_ridges_(with_edges && has_shallow_ridges(mesh)) {
   if (mesh.facets().size() > scan_limit) {
-    std::vector<Box> boxes;
+    std::vector<stimuli::Box> boxes;
     boxes.reserve(mesh.facets().size());
     for (std::uint32_t f = 0; f < mesh.facets().size(); ++f) {
       const stimuli::Facet& facet = mesh.facets()[f];
-      Box box{Vec3(HUGE_VAL), Vec3(-HUGE_VAL)};
+      stimuli::Box box;
       for (std::uint32_t i = facet.first_side; i < facet.first_side + facet.side_count; ++i) {
         const stimuli::Edge& edge = mesh.edges()[mesh.sides()[i].edge];
-        for (const std::uint32_t v : {edge.v0, edge.v1}) {
-          box.low = glm::min(box.low, mesh.vertices()[v]);
-          box.high = glm::max(box.high, mesh.vertices()[v]);
-        }
+        for (const std::uint32_t v : {edge.v0, edge.v1}) box.add(mesh.vertices()[v]);
       }
       boxes.push_back(box);
     }
-    polygons_ = BoundingTree(boxes);
+    polygons_ = stimuli::BoundingTree(boxes);
   }
   if (with_edges && mesh.edges().size() > scan_limit) {
-    std::vector<Box> boxes;
+    std::vector<stimuli::Box> boxes;
     boxes.reserve(mesh.edges().size());
     for (const stimuli::Edge& edge : mesh.edges()) {
       const Vec3 &a = edge.from, &b = edge.to;
       boxes.push_back({glm::min(a, b), glm::max(a, b)});
     }
-    edges_ = BoundingTree(boxes);
+    edges_ = stimuli::BoundingTree(boxes);
   }
 }
 

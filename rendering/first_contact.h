@@ -4,10 +4,11 @@
 
 #include <cstdint>
 
-#include "rendering/bounding_tree.h"
 #include "rendering/contact_feature.h"
-#include "rendering/direction_maps.h"
+#include "rendering/facet_map.h"
 #include "rendering/probe.h"
+#include "stimuli/bounding_tree.h"
+#include "stimuli/surfaces/support_map.h"
 #include "stimuli/vec.h"
 
 namespace palpate::stimuli {
@@ -28,18 +29,22 @@ class ContactTrees {
   /// \param small_mesh  for measurements: a mesh of up to so many vertices gets no maps
   ContactTrees(const stimuli::ConvexMesh& mesh, bool with_edges,
                std::size_t scan_limit = kScanLimit,
-               std::size_t small_mesh = SupportMap::kSmallMesh);
+               std::size_t small_mesh = stimuli::SupportMap::kSmallMesh);
 
-  const BoundingTree* polygons() const { return polygons_.nodes().empty() ? nullptr : &polygons_; }
-  const BoundingTree* edges() const { return edges_.nodes().empty() ? nullptr : &edges_; }
+  const stimuli::BoundingTree* polygons() const {
+    return polygons_.nodes().empty() ? nullptr : &polygons_;
+  }
+  const stimuli::BoundingTree* edges() const { return edges_.nodes().empty() ? nullptr : &edges_; }
   /// Two large faces meet at less than twice the blend angle of equation (2).
   bool shallow_ridges() const { return shallow_ridges_; }
-  const SupportMap* support_map() const { return support_map_.empty() ? nullptr : &support_map_; }
+  const stimuli::SupportMap* support_map() const {
+    return support_map_.empty() ? nullptr : &support_map_;
+  }
   const FacetMap* facet_map() const { return facet_map_.empty() ? nullptr : &facet_map_; }
 
  private:
-  BoundingTree polygons_, edges_;
-  SupportMap support_map_;
+  stimuli::BoundingTree polygons_, edges_;
+  stimuli::SupportMap support_map_;
   FacetMap facet_map_;
   bool shallow_ridges_ = false;
 };

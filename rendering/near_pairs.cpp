@@ -55,8 +55,8 @@ Measured measured(const stimuli::ConvexMesh& mesh, ContactFeature feature, const
 /// A vertex far along `direction`.
 std::uint32_t vertex_under(const CastMesh& part, const Vec3& direction) {
   const Vec3 along = glm::dot(direction, direction) > 0 ? direction : Vec3(1, 0, 0);
-  const SupportMap* const map = part.trees.support_map();
-  return support_vertex(part.mesh, along, map != nullptr ? map->near_support(along) : 0);
+  const stimuli::SupportMap* const map = part.trees.support_map();
+  return stimuli::support_vertex(part.mesh, along, map != nullptr ? map->near_support(along) : 0);
 }
 
 template <bool kSegment>
@@ -390,7 +390,7 @@ void search_tree(const Scene& scene, NearbyParts& nearby, const Distance2& dista
     // No part's sphere is larger than the one that holds it.
     const double far = std::max(room, nearby.room) + (1 + kReachShare) * spheres[at.node].radius;
     if (at.distance2 > far * far) continue;
-    const BoundingTree::Node& node = nodes[at.node];
+    const stimuli::BoundingTree::Node& node = nodes[at.node];
     for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
       const ScenePart& part = scene.parts()[order[i]];
       const double own =

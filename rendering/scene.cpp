@@ -263,14 +263,14 @@ void Scene::add_surfaces(std::vector<SceneSurface> surfaces, TickFeatures& featu
 
 void Scene::index_parts() {
   if (parts_.size() <= kFewParts) return;
-  std::vector<Box> boxes;
+  std::vector<stimuli::Box> boxes;
   boxes.reserve(parts_.size());
   for (const ScenePart& part : parts_) {
     boxes.push_back(
         {part.sphere_centre - part.sphere_radius, part.sphere_centre + part.sphere_radius});
     mean_radius_ += part.sphere_radius / static_cast<double>(parts_.size());
   }
-  part_tree_ = BoundingTree(boxes);
+  part_tree_ = stimuli::BoundingTree(boxes);
   const auto& nodes = part_tree_.nodes();
   node_spheres_.resize(nodes.size());
   for (std::uint32_t n = static_cast<std::uint32_t>(nodes.size()); n-- > 0;) {

@@ -9,7 +9,6 @@
 #include <memory>
 #include <vector>
 
-#include "rendering/bounding_tree.h"
 #include "rendering/contact.h"
 #include "rendering/contact_feature.h"
 #include "rendering/fields.h"
@@ -18,6 +17,7 @@
 #include "rendering/texture.h"
 #include "rendering/tool.h"
 #include "rendering/union_state.h"
+#include "stimuli/bounding_tree.h"
 #include "stimuli/shapes.h"
 
 namespace palpate::stimuli {
@@ -57,7 +57,7 @@ struct SceneObject {
 /// A closed surface to be put into a scene: all shells of an object or of one of its layers, or of
 /// fixed objects that touch.
 struct SceneSurface {
-  std::shared_ptr<const Surface> surface;
+  std::shared_ptr<const stimuli::Surface> surface;
   Pose pose;
   int object = 0;               ///< index of the object in the scene; of several the first
   std::vector<int> of_shell{};  ///< object of each shell; empty: all are of `object`
@@ -217,7 +217,7 @@ class Scene {
   double tool_reach() const { return tool_reach_; }
   static constexpr std::size_t kFewParts = 32;  ///< up to so many parts get no tree
   /// Over the parts' bounding spheres.
-  const BoundingTree& part_tree() const { return part_tree_; }
+  const stimuli::BoundingTree& part_tree() const { return part_tree_; }
   struct Sphere {
     Vec3 centre;        ///< m
     double radius = 0;  ///< m
@@ -249,7 +249,7 @@ class Scene {
   bool is_one_surface_ = false;
   std::shared_ptr<const SceneMotion> motion_;
   std::shared_ptr<const SceneEffects> effects_;
-  BoundingTree part_tree_;
+  stimuli::BoundingTree part_tree_;
   std::vector<Sphere> node_spheres_;
   double mean_radius_ = 0;
 };

@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 
-#include "rendering/direction_maps.h"
 #include "stimuli/convex_mesh.h"
+#include "stimuli/surfaces/support_map.h"
 
 namespace palpate::rendering {
 namespace {
@@ -89,30 +89,9 @@ Nearest nearest_to_origin(const Simplex& s) {
 
 }  // namespace
 
-std::uint32_t support_vertex(const stimuli::ConvexMesh& mesh, const Vec3& direction,
-                             std::uint32_t start) {
-  std::uint32_t best = start;
-  double height = glm::dot(direction, mesh.vertices()[best]);
-  for (bool climbing = true; climbing;) {
-    climbing = false;
-    const std::uint32_t from = best;
-    for (std::uint32_t i = mesh.fan_first()[from]; i < mesh.fan_first()[from + 1]; ++i) {
-      const stimuli::Edge& edge = mesh.edges()[mesh.fan_edges()[i]];
-      const std::uint32_t neighbour = edge.v0 == from ? edge.v1 : edge.v0;
-      const double h = glm::dot(direction, mesh.vertices()[neighbour]);
-      if (h > height) {
-        height = h;
-        best = neighbour;
-        climbing = true;
-      }
-    }
-  }
-  return best;
-}
-
 void find_separating_plane(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& tail,
                            double tolerance, SeparatingPlane& plane, std::uint32_t& support,
-                           const SupportMap* map) {
+                           const stimuli::SupportMap* map) {
   constexpr int kIterations = 40;
   Vec3 direction = plane.normal;
   if (!(glm::dot(direction, direction) > 0.5)) direction = 0.5 * (tip + tail) - mesh.centre();
@@ -130,7 +109,7 @@ void find_separating_plane(const stimuli::ConvexMesh& mesh, const Vec3& tip, con
       const auto& vertices = mesh.vertices();
       if (glm::dot(n, vertices[near]) > glm::dot(n, vertices[support])) support = near;
     }
-    support = support_vertex(mesh, n, support);
+    support = stimuli::support_vertex(mesh, n, support);
     const Vec3& lower_end = glm::dot(n, tip) <= glm::dot(n, tail) ? tip : tail;
     const Vec3 w = lower_end - mesh.vertices()[support];
     const double gap = glm::dot(n, w);

@@ -9,11 +9,10 @@
 
 namespace palpate::stimuli {
 class ConvexMesh;
-}
+class SupportMap;
+}  // namespace palpate::stimuli
 
 namespace palpate::rendering {
-
-class SupportMap;
 
 /// The object lies within dot(normal, p) <= offset.
 struct SeparatingPlane {
@@ -27,11 +26,6 @@ struct SeparatingPlane {
   }
 };
 
-/// Support function of the mesh: the vertex farthest along `direction`, by hill climbing from
-/// `start`. Exact on a convex mesh.
-std::uint32_t support_vertex(const stimuli::ConvexMesh& mesh, const Vec3& direction,
-                             std::uint32_t start);
-
 /// Searches for a separating plane between the mesh and the segment, starting from `plane.normal`
 /// (any direction if there is none) and the vertex `support`; updates both and sets plane.valid.
 /// Gilbert, Johnson & Keerthi 1988 (GJK), stopped at the first direction that gives at least half
@@ -41,6 +35,6 @@ std::uint32_t support_vertex(const stimuli::ConvexMesh& mesh, const Vec3& direct
 /// \param map  of the mesh, the start of hill climbing; or null
 void find_separating_plane(const stimuli::ConvexMesh& mesh, const Vec3& tip, const Vec3& tail,
                            double tolerance, SeparatingPlane& plane, std::uint32_t& support,
-                           const SupportMap* map = nullptr);
+                           const stimuli::SupportMap* map = nullptr);
 
 }  // namespace palpate::rendering

@@ -8,8 +8,8 @@
 #include "rendering/probes.h"
 #include "rendering/render_fault.h"
 #include "rendering/surface_patch.h"
-#include "rendering/surface_search.h"
 #include "rendering/surface_tool.h"
+#include "stimuli/surfaces/surface_search.h"
 
 namespace palpate::rendering {
 namespace {
@@ -25,7 +25,7 @@ constexpr int kMostFaces = 64;      // to each side of a contact
 constexpr double kFlat = 1 - 5e-9;  // cosine of 1e-4 rad: rounding may bend a flat face so far
 
 /// Angle of the segment to a triangle, of the blend angle, -1 to 1; 1: its tip dips.
-double turned_to(const SurfaceTriangle& triangle, const Vec3& d, double length) {
+double turned_to(const stimuli::SurfaceTriangle& triangle, const Vec3& d, double length) {
   const double slope = glm::dot(triangle.normal, d);
   if (slope >= tick::kSinBlendAngle * length) return 1;
   if (slope <= -tick::kSinBlendAngle * length) return -1;
@@ -35,7 +35,7 @@ double turned_to(const SurfaceTriangle& triangle, const Vec3& d, double length) 
 /// A segment that lies on a surface, from tip to tip + d.
 class Lying {
  public:
-  Lying(const Surface& surface, const Vec3& tip, const Vec3& d)
+  Lying(const stimuli::Surface& surface, const Vec3& tip, const Vec3& d)
       : surface_(surface), tip_(tip), d_(d), length_(glm::length(d)) {}
 
   struct Crossed {
@@ -49,7 +49,7 @@ class Lying {
 
   /// The portion of the segment over a triangle, in its plane, and the side where it leaves.
   Crossed crossed(std::uint32_t index, bool towards_end) const {
-    const SurfaceTriangle& t = surface_.triangles()[index];
+    const stimuli::SurfaceTriangle& t = surface_.triangles()[index];
     Crossed out{{}, 0};
     double nearest = HUGE_VAL;
     for (std::uint32_t k = 0; k < 3; ++k) {
@@ -83,13 +83,14 @@ class Lying {
       moved += (end - from) * 0.5 * (towards_end ? 1 - angle : 1 + angle);
       from = end;
       if (towards_end ? from >= 1 : from <= 0) break;
-      const SurfaceTriangle& beyond = surface_.triangles()[SurfaceTriangle::triangle_of(at.next)];
-      const std::uint32_t side = SurfaceTriangle::side_of(at.next);
+      const stimuli::SurfaceTriangle& beyond =
+          surface_.triangles()[stimuli::SurfaceTriangle::triangle_of(at.next)];
+      const std::uint32_t side = stimuli::SurfaceTriangle::side_of(at.next);
       // Across a hollow, the segment touches only one of its sides.
       if ((!beyond.touches(side) || beyond.folded(side)) &&
           glm::dot(beyond.normal, surface_.triangles()[triangle].normal) < kFlat)
         break;
-      triangle = SurfaceTriangle::triangle_of(at.next);
+      triangle = stimuli::SurfaceTriangle::triangle_of(at.next);
     }
     return moved;
   }
@@ -97,7 +98,7 @@ class Lying {
   double length() const { return length_; }
 
  private:
-  const Surface& surface_;
+  const stimuli::Surface& surface_;
   Vec3 tip_, d_;
   double length_;
 };
@@ -105,15 +106,15 @@ class Lying {
 /// Where the segment touches: equation (2) over the triangles that it lies along.
 /// \param at  of the patch's own contact point on the segment
 /// \param pressed  share of the segment about that point that lies on the surface (texture.h)
-double place_on(const Surface& surface, const SurfacePatch& patch, const Vec3& tip, const Vec3& d,
-                double at, ContactType& type, double& pressed) {
+double place_on(const stimuli::Surface& surface, const SurfacePatch& patch, const Vec3& tip,
+                const Vec3& d, double at, ContactType& type, double& pressed) {
   const Lying lying(surface, tip, d);
   const std::uint32_t left = patch.triangle();
   int along = 0;
   double forwards = 0, back = 0;
   if (patch.kind == PatchKind::edge) {
-    const std::uint32_t right = SurfaceTriangle::triangle_of(
-        surface.triangles()[left].across[SurfaceTriangle::side_of(patch.side)]);
+    const std::uint32_t right = stimuli::SurfaceTriangle::triangle_of(
+        surface.triangles()[left].across[stimuli::SurfaceTriangle::side_of(patch.side)]);
     // The triangle ahead slopes down along the segment.
     const bool left_ahead = by_tip(surface.triangles()[left], d);
     const std::uint32_t ahead = left_ahead ? left : right, behind = left_ahead ? right : left;
@@ -154,7 +155,7 @@ double SurfaceTool::tool_size() const {
 }
 
 /// Whether the segment can touch nothing within the motion.
-bool SurfaceTool::is_clear(const SegmentMotion& motion) const {
+bool SurfaceTool::is_clear(const stimuli::SegmentMotion& motion) const {
   bool clear = true;
   surface_.touchable(motion, [&](std::uint32_t, std::uint8_t) { return clear = false; });
   return clear;
@@ -287,7 +288,7 @@ bool SurfaceTool::virtual_inside() {
     inside = surface_.winding(segment.start) > 0;
     if (inside || segment.along == Vec3(0)) continue;
     surface_.near_segment(segment.start, segment.along, [&](std::uint32_t index) {
-      const SurfaceTriangle& t = surface_.triangles()[index];
+      const stimuli::SurfaceTriangle& t = surface_.triangles()[index];
       const double a = glm::dot(t.normal, segment.start) - t.offset,
                    b = a + glm::dot(t.normal, segment.along);
       if (std::min(a, b) > -tolerance_ || std::max(a, b) < tolerance_) return true;
@@ -375,7 +376,7 @@ SurfacePatch SurfaceTool::flattest(const SurfacePatch& patch) const {
 void SurfaceTool::add_contact(const SurfacePlane& plane, const Vec3& shift) {
   const SurfacePatch patch = flattest(plane.patch);
   const PosedTool::Segment& segment = turned_.segments[patch.segment];
-  const SurfaceTriangle& triangle = surface_.triangles()[patch.triangle()];
+  const stimuli::SurfaceTriangle& triangle = surface_.triangles()[patch.triangle()];
   PlacedContact& out = all_.contacts.emplace_back();
   LoadedContact& c = out.loaded;
   c.contact.normal = placed_.world_vector(plane.normal);
@@ -391,7 +392,7 @@ void SurfaceTool::add_contact(const SurfacePlane& plane, const Vec3& shift) {
     c.probe_fraction = patch.tail ? 1 : 0;
     if (patch.kind == PatchKind::edge) {
       c.contact.type = ContactType::segment_edge;
-      const std::uint32_t k = SurfaceTriangle::side_of(patch.side);
+      const std::uint32_t k = stimuli::SurfaceTriangle::side_of(patch.side);
       const Vec3& v0 = surface_.vertices()[triangle.corners[k]];
       const Vec3 e = surface_.vertices()[triangle.corners[(k + 1) % 3]] - v0;
       if (tick_.scene.material_of(c.part).texture != nullptr) {

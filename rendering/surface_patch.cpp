@@ -13,15 +13,17 @@ constexpr double kSilhouette = 1e-12;  // of the length; tolerance of a segment 
 
 /// A side from v0 to v1, with its own triangle on the left.
 struct EdgeOf {
-  const SurfaceTriangle &left, &right;
+  const stimuli::SurfaceTriangle &left, &right;
   Vec3 v0, v1;
   bool folded = false;
 };
 
-EdgeOf edge_of(const Surface& surface, std::uint32_t side) {
-  const SurfaceTriangle& left = surface.triangles()[SurfaceTriangle::triangle_of(side)];
-  const std::uint32_t k = SurfaceTriangle::side_of(side);
-  const SurfaceTriangle& right = surface.triangles()[SurfaceTriangle::triangle_of(left.across[k])];
+EdgeOf edge_of(const stimuli::Surface& surface, std::uint32_t side) {
+  const stimuli::SurfaceTriangle& left =
+      surface.triangles()[stimuli::SurfaceTriangle::triangle_of(side)];
+  const std::uint32_t k = stimuli::SurfaceTriangle::side_of(side);
+  const stimuli::SurfaceTriangle& right =
+      surface.triangles()[stimuli::SurfaceTriangle::triangle_of(left.across[k])];
   return {left, right, surface.vertices()[left.corners[k]],
           surface.vertices()[left.corners[(k + 1) % 3]], left.folded(k)};
 }
@@ -60,9 +62,10 @@ bool goes_through(const PatchPolygon& polygon, const Vec3& normal, const Vec3& f
 }
 
 /// Tests a segment end that moves from `from` to `to` against a triangle.
-void sweep_end(const Surface& surface, std::uint32_t index, std::uint8_t segment, bool tail,
-               const Vec3& from, const Vec3& to, double tolerance, double border, PatchHit& first) {
-  const SurfaceTriangle& t = surface.triangles()[index];
+void sweep_end(const stimuli::Surface& surface, std::uint32_t index, std::uint8_t segment,
+               bool tail, const Vec3& from, const Vec3& to, double tolerance, double border,
+               PatchHit& first) {
+  const stimuli::SurfaceTriangle& t = surface.triangles()[index];
   const Vec3 a = surface.vertices()[t.corners[0]] - from;
   const double start =
       t.shares_plane() ? glm::dot(t.normal, from) - t.offset : -glm::dot(t.normal, a);
@@ -81,7 +84,7 @@ void sweep_end(const Surface& surface, std::uint32_t index, std::uint8_t segment
 
 /// Tests a segment whose ends move linearly against an edge. The two are coplanar at the roots of a
 /// quadratic equation in time.
-void sweep_edge(const Surface& surface, std::uint32_t side, std::uint8_t segment,
+void sweep_edge(const stimuli::Surface& surface, std::uint32_t side, std::uint8_t segment,
                 const PosedTool::Segment& from, const PosedTool::Segment& to, double tolerance,
                 double slack, PatchHit& first) {
   const EdgeOf edge = edge_of(surface, side);
@@ -95,7 +98,9 @@ void sweep_edge(const Surface& surface, std::uint32_t side, std::uint8_t segment
   const double bend = 0.25 * std::abs(c2) + rounding;  // at most, off the line from c0 to the end
   if (std::min(c0, end) > bend || std::max(c0, end) < -bend) return;
   const auto try_at = [&](double time) {
-    if (!(time <= 1) || !first.yields_to(time, segment, SurfaceTriangle::triangle_of(side))) return;
+    if (!(time <= 1) ||
+        !first.yields_to(time, segment, stimuli::SurfaceTriangle::triangle_of(side)))
+      return;
     const Vec3 along = from.along + time * turn;
     const double left = glm::dot(edge.left.normal, along),
                  right = glm::dot(edge.right.normal, along), level = kSilhouette * length;
@@ -128,19 +133,20 @@ void sweep_edge(const Surface& surface, std::uint32_t side, std::uint8_t segment
 
 }  // namespace
 
-bool exists(const Surface& surface, const SurfacePatch& patch, const PosedTool& tool) {
+bool exists(const stimuli::Surface& surface, const SurfacePatch& patch, const PosedTool& tool) {
   const Vec3& along = tool.segments[patch.segment].along;
-  const SurfaceTriangle& t = surface.triangles()[patch.triangle()];
+  const stimuli::SurfaceTriangle& t = surface.triangles()[patch.triangle()];
   if (patch.kind == PatchKind::face) return by_tip(t, along) != patch.tail;
-  const std::uint32_t across = t.across[SurfaceTriangle::side_of(patch.side)];
+  const std::uint32_t across = t.across[stimuli::SurfaceTriangle::side_of(patch.side)];
   return by_tip(t, along) !=
-         by_tip(surface.triangles()[SurfaceTriangle::triangle_of(across)], along);
+         by_tip(surface.triangles()[stimuli::SurfaceTriangle::triangle_of(across)], along);
 }
 
-PatchPlane plane_of(const Surface& surface, const SurfacePatch& patch, const PosedTool& tool) {
+PatchPlane plane_of(const stimuli::Surface& surface, const SurfacePatch& patch,
+                    const PosedTool& tool) {
   const PosedTool::Segment& segment = tool.segments[patch.segment];
   if (patch.kind == PatchKind::face) {
-    const SurfaceTriangle& t = surface.triangles()[patch.triangle()];
+    const stimuli::SurfaceTriangle& t = surface.triangles()[patch.triangle()];
     const Vec3 end = segment.end(patch.tail);
     if (t.shares_plane()) return {t.normal, t.offset - glm::dot(t.normal, end)};
     return {t.normal, glm::dot(t.normal, surface.vertices()[t.corners[0]] - end)};
@@ -154,11 +160,12 @@ PatchPlane plane_of(const Surface& surface, const SurfacePatch& patch, const Pos
   return plane;
 }
 
-PatchPolygon polygon_of(const Surface& surface, const SurfacePatch& patch, const PosedTool& tool) {
+PatchPolygon polygon_of(const stimuli::Surface& surface, const SurfacePatch& patch,
+                        const PosedTool& tool) {
   const PosedTool::Segment& segment = tool.segments[patch.segment];
   PatchPolygon out;
   if (patch.kind == PatchKind::face) {
-    const SurfaceTriangle& t = surface.triangles()[patch.triangle()];
+    const stimuli::SurfaceTriangle& t = surface.triangles()[patch.triangle()];
     const Vec3 end = segment.end(patch.tail);
     out.count = 3;
     for (std::size_t k = 0; k < 3; ++k) out.corners[k] = surface.vertices()[t.corners[k]] - end;
@@ -172,7 +179,7 @@ PatchPolygon polygon_of(const Surface& surface, const SurfacePatch& patch, const
   return out;
 }
 
-SurfacePatch patch_after_turn(const Surface& surface, const SurfacePatch& patch,
+SurfacePatch patch_after_turn(const stimuli::Surface& surface, const SurfacePatch& patch,
                               const PosedTool& tool) {
   if (patch.kind != PatchKind::edge) return patch;
   const Vec3& along = tool.segments[patch.segment].along;
@@ -182,10 +189,10 @@ SurfacePatch patch_after_turn(const Surface& surface, const SurfacePatch& patch,
   const bool left =
       std::abs(glm::dot(edge.left.normal, along)) <= std::abs(glm::dot(edge.right.normal, along));
   const std::uint32_t triangle =
-      left
-          ? patch.triangle()
-          : SurfaceTriangle::triangle_of(
-                surface.triangles()[patch.triangle()].across[SurfaceTriangle::side_of(patch.side)]);
+      left ? patch.triangle()
+           : stimuli::SurfaceTriangle::triangle_of(
+                 surface.triangles()[patch.triangle()]
+                     .across[stimuli::SurfaceTriangle::side_of(patch.side)]);
   return {triangle << 2, patch.segment, !by_tip(edge.left, along), PatchKind::face};
 }
 
@@ -230,9 +237,9 @@ double distance_off(const PatchPolygon& polygon, const Vec3& normal, const Vec3&
   return std::sqrt(nearest);
 }
 
-void cast_on_patch(const Surface& surface, const SurfacePatch& patch, const PatchPlane& plane,
-                   const PosedTool& tool, const Vec3& from, const Vec3& to, double tolerance,
-                   double border, PatchHit& first) {
+void cast_on_patch(const stimuli::Surface& surface, const SurfacePatch& patch,
+                   const PatchPlane& plane, const PosedTool& tool, const Vec3& from, const Vec3& to,
+                   double tolerance, double border, PatchHit& first) {
   const double start = glm::dot(plane.normal, from) - plane.depth,
                end = glm::dot(plane.normal, to) - plane.depth;
   if (end > 0 || start < -tolerance || !(end < start)) return;
@@ -244,24 +251,25 @@ void cast_on_patch(const Surface& surface, const SurfacePatch& patch, const Patc
     first = {patch, time};
 }
 
-void sweep_triangle(const Surface& surface, std::uint32_t index, std::uint8_t segment,
+void sweep_triangle(const stimuli::Surface& surface, std::uint32_t index, std::uint8_t segment,
                     std::uint8_t what, const PosedTool::Segment& from, const PosedTool::Segment& to,
                     double tolerance, double slack, double border, PatchHit& first) {
-  if ((what & surface_pair::kTip) != 0)
+  if ((what & stimuli::surface_pair::kTip) != 0)
     sweep_end(surface, index, segment, false, from.start, to.start, tolerance, border, first);
   if (from.along == Vec3(0) && to.along == Vec3(0)) return;
-  if ((what & surface_pair::kTail) != 0)
+  if ((what & stimuli::surface_pair::kTail) != 0)
     sweep_end(surface, index, segment, true, from.end(true), to.end(true), tolerance, border,
               first);
-  if ((what & surface_pair::kSides) == 0) return;
-  const SurfaceTriangle& t = surface.triangles()[index];
+  if ((what & stimuli::surface_pair::kSides) == 0) return;
+  const stimuli::SurfaceTriangle& t = surface.triangles()[index];
   const double first_slope = glm::dot(t.normal, from.along),
                last_slope = glm::dot(t.normal, to.along),
                level = 2 * kSilhouette * glm::length(from.along);
   for (std::uint32_t k = 0; k < 3; ++k) {
     if ((what >> k & 1) == 0 || !t.owns(k) || !t.touches(k)) continue;
     // Both triangles face the same way all the time.
-    const Vec3& beyond = surface.triangles()[SurfaceTriangle::triangle_of(t.across[k])].normal;
+    const Vec3& beyond =
+        surface.triangles()[stimuli::SurfaceTriangle::triangle_of(t.across[k])].normal;
     const double first_beyond = glm::dot(beyond, from.along),
                  last_beyond = glm::dot(beyond, to.along);
     if (std::max(std::max(first_slope, last_slope), std::max(first_beyond, last_beyond)) < -level ||

@@ -8,8 +8,8 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "rendering/surface.h"
 #include "rendering/tool.h"
+#include "stimuli/surfaces/surface.h"
 
 namespace palpate::rendering {
 
@@ -59,18 +59,20 @@ struct PatchPolygon {
 };
 
 /// Whether the triangle is touched by the tip of a segment of this direction, not by its tail.
-inline bool by_tip(const SurfaceTriangle& triangle, const Vec3& along) {
+inline bool by_tip(const stimuli::SurfaceTriangle& triangle, const Vec3& along) {
   return triangle.normal.x * along.x + triangle.normal.y * along.y + triangle.normal.z * along.z >=
          0;
 }
 
 /// \param tool  with the translation 0
-PatchPlane plane_of(const Surface& surface, const SurfacePatch& patch, const PosedTool& tool);
-PatchPolygon polygon_of(const Surface& surface, const SurfacePatch& patch, const PosedTool& tool);
+PatchPlane plane_of(const stimuli::Surface& surface, const SurfacePatch& patch,
+                    const PosedTool& tool);
+PatchPolygon polygon_of(const stimuli::Surface& surface, const SurfacePatch& patch,
+                        const PosedTool& tool);
 
 /// The patch that replaces this one after a turn in which its edge stopped being a silhouette; else
 /// the same patch.
-SurfacePatch patch_after_turn(const Surface& surface, const SurfacePatch& patch,
+SurfacePatch patch_after_turn(const stimuli::Surface& surface, const SurfacePatch& patch,
                               const PosedTool& tool);
 
 /// Whether a line in the direction of `way` from `from`, against the normal, goes through the
@@ -83,7 +85,7 @@ bool meets(const PatchPolygon& polygon, const Vec3& from, const Vec3& way, doubl
 double distance_off(const PatchPolygon& polygon, const Vec3& normal, const Vec3& at);
 
 /// Whether the patch is one for the tool in this orientation.
-bool exists(const Surface& surface, const SurfacePatch& patch, const PosedTool& tool);
+bool exists(const stimuli::Surface& surface, const SurfacePatch& patch, const PosedTool& tool);
 
 /// Where a motion of the tool first meets a patch.
 struct PatchHit {
@@ -100,29 +102,30 @@ struct PatchHit {
 /// Replaces `first` if a translation from `from` to `to` enters the patch earlier.
 /// \param tolerance  m; a tool less than this behind a plane counts as before it
 /// \param border  m; so far beyond its border the patch is met as well
-void cast_on_patch(const Surface& surface, const SurfacePatch& patch, const PatchPlane& plane,
-                   const PosedTool& tool, const Vec3& from, const Vec3& to, double tolerance,
-                   double border, PatchHit& first);
+void cast_on_patch(const stimuli::Surface& surface, const SurfacePatch& patch,
+                   const PatchPlane& plane, const PosedTool& tool, const Vec3& from, const Vec3& to,
+                   double tolerance, double border, PatchHit& first);
 
 /// The same for a segment whose ends move linearly, over all patches of a triangle and its own
 /// sides. \param what   patches to test; bits of surface_pair \param slack  m; edges and segment
 /// are extended by it \param border  m; so far beyond its border a triangle is met as well
-void sweep_triangle(const Surface& surface, std::uint32_t triangle, std::uint8_t segment,
+void sweep_triangle(const stimuli::Surface& surface, std::uint32_t triangle, std::uint8_t segment,
                     std::uint8_t what, const PosedTool::Segment& from, const PosedTool::Segment& to,
                     double tolerance, double slack, double border, PatchHit& first);
 
 /// Calls visit(patch) for the patches of a triangle and its own sides.
 template <class Visit>
-void for_each_patch(const Surface& surface, std::uint32_t index, std::uint8_t segment,
+void for_each_patch(const stimuli::Surface& surface, std::uint32_t index, std::uint8_t segment,
                     std::uint8_t what, const Vec3& along, const Visit& visit) {
-  const SurfaceTriangle& triangle = surface.triangles()[index];
+  const stimuli::SurfaceTriangle& triangle = surface.triangles()[index];
   const bool tip = by_tip(triangle, along);
-  if ((what & (tip ? surface_pair::kTip : surface_pair::kTail)) != 0)
+  if ((what & (tip ? stimuli::surface_pair::kTip : stimuli::surface_pair::kTail)) != 0)
     visit(SurfacePatch{index << 2, segment, !tip, SurfacePatch::Kind::face});
-  if ((what & surface_pair::kSides) == 0 || along == Vec3(0)) return;
+  if ((what & stimuli::surface_pair::kSides) == 0 || along == Vec3(0)) return;
   for (std::uint32_t k = 0; k < 3; ++k) {
     if ((what >> k & 1) == 0 || !triangle.owns(k) || !triangle.touches(k)) continue;
-    if (by_tip(surface.triangles()[SurfaceTriangle::triangle_of(triangle.across[k])], along) == tip)
+    if (by_tip(surface.triangles()[stimuli::SurfaceTriangle::triangle_of(triangle.across[k])],
+               along) == tip)
       continue;
     visit(SurfacePatch{index << 2 | k, segment, false, SurfacePatch::Kind::edge});
   }

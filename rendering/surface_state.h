@@ -17,7 +17,7 @@ namespace palpate::rendering {
 
 /// A closed surface as the tick uses it. World frame, m.
 struct PlacedSurface {
-  std::shared_ptr<const Surface> surface;
+  std::shared_ptr<const stimuli::Surface> surface;
   Mat3 to_world;  ///< rotation from the surface's frame
   Vec3 position;  ///< of its origin
   Vec3 sphere_centre;

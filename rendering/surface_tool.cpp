@@ -5,7 +5,7 @@
 #include <glm/geometric.hpp>
 
 #include "rendering/surface_patch.h"
-#include "rendering/surface_search.h"
+#include "stimuli/surfaces/surface_search.h"
 
 namespace palpate::rendering {
 namespace {
@@ -93,20 +93,21 @@ double most_turned(const PosedTool& from, const PosedTool& to) {
 void SurfaceTool::list_triangle(std::uint32_t index, std::uint8_t what, std::uint8_t segment) {
   const Vec3& along = own_.listed.segments[segment].along;
   const double length2 = glm::dot(along, along), level = kLevelAlong * std::sqrt(length2);
-  const SurfaceTriangle& t = surface_.triangles()[index];
+  const stimuli::SurfaceTriangle& t = surface_.triangles()[index];
   const double own = glm::dot(t.normal, along);
   const auto add_face = [&](bool tail) {
     const Vec3 end = own_.listed.segments[segment].end(tail);
     own_.patches.push_back({{t.normal, t.offset - glm::dot(t.normal, end)},
                             {index << 2, segment, tail, SurfacePatch::Kind::face}});
   };
-  if ((what & surface_pair::kTip) != 0 && own >= -level) add_face(false);
+  if ((what & stimuli::surface_pair::kTip) != 0 && own >= -level) add_face(false);
   if (!(length2 > 0)) return;
-  if ((what & surface_pair::kTail) != 0 && own <= level) add_face(true);
-  if ((what & surface_pair::kSides) == 0) return;
+  if ((what & stimuli::surface_pair::kTail) != 0 && own <= level) add_face(true);
+  if ((what & stimuli::surface_pair::kSides) == 0) return;
   for (std::uint32_t k = 0; k < 3; ++k) {
     if (!t.owns(k) || !t.touches(k)) continue;
-    const SurfaceTriangle& beyond = surface_.triangles()[SurfaceTriangle::triangle_of(t.across[k])];
+    const stimuli::SurfaceTriangle& beyond =
+        surface_.triangles()[stimuli::SurfaceTriangle::triangle_of(t.across[k])];
     const double other = glm::dot(beyond.normal, along);
     if (std::min(own, other) > level || std::max(own, other) < -level) continue;
     const SurfacePatch patch{index << 2 | k, segment, false, SurfacePatch::Kind::edge};

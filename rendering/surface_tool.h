@@ -52,7 +52,7 @@ class SurfaceTool {
   }
   double tool_size() const;
   bool far_away();
-  bool is_clear(const SegmentMotion& motion) const;
+  bool is_clear(const stimuli::SegmentMotion& motion) const;
   void step(const ToolPose& target, const ToolPose& from);
   void meet(const ToolPose& target, const ToolPose& from);
   void rest();
@@ -110,7 +110,7 @@ class SurfaceTool {
   UnionTick& tick_;
   UnionMemory& all_;
   const PlacedSurface& placed_;
-  const Surface& surface_;
+  const stimuli::Surface& surface_;
   SurfaceState& own_;
   GroupState& memory_;
   std::uint32_t group_;

@@ -80,7 +80,7 @@ void LayerShells::add_bound(const LayeredShape& shape) {
 std::vector<rendering::SceneSurface> LayerShells::surfaces(const Pose& pose, int solid) const {
   std::vector<rendering::SceneSurface> out;
   for (const Shells& shells : all_) {
-    out.push_back({std::make_shared<const rendering::Surface>(shells.shells), pose, solid,
+    out.push_back({std::make_shared<const stimuli::Surface>(shells.shells), pose, solid,
                    shells.objects, shells.number, shells.break_force});
   }
   std::ranges::stable_sort(out, {}, &rendering::SceneSurface::layer);

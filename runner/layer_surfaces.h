@@ -58,7 +58,7 @@ class LayerShells {
   struct Shells {
     int number;
     double break_force;  // N
-    std::vector<rendering::SurfaceShell> shells;
+    std::vector<stimuli::SurfaceShell> shells;
     std::vector<int> objects;
   };
   Shells& of(int number, double break_force);

@@ -130,9 +130,9 @@ std::vector<std::shared_ptr<const stimuli::ConvexMesh>> shared(
 
 /// Whether rounding made steps or gaps between parts that the law of unions would feel: it has a
 /// thinner skin.
-bool has_seams(const std::vector<rendering::SurfaceShell>& shells) {
+bool has_seams(const std::vector<stimuli::SurfaceShell>& shells) {
   constexpr double kFelt = 5e-10;  // of the size
-  const rendering::Surface surface(shells);
+  const stimuli::Surface surface(shells);
   return surface.seam() > kFelt * surface.size();
 }
 
@@ -412,15 +412,15 @@ void SceneBuilder::place(const stimuli::ObjectSpec& spec, const Pose& parent, in
 /// Prepares the surface for the law while it is checked, and gives the polygons up on the way.
 void SceneBuilder::take_large_surface(const stimuli::ObjectSpec& spec, stimuli::PolygonSoup soup,
                                       LoadedMesh& loaded) {
-  std::shared_ptr<const rendering::Surface> prepared;
+  std::shared_ptr<const stimuli::Surface> prepared;
   const auto prepare_it = [&](const stimuli::ClosedSurface& unchecked) {
     if (!(spec.material.stiffness > 0) || spec.texture) return;
     stimuli::Material material = spec.material;
     material.layers.clear();
-    const std::vector<rendering::SurfaceShell> shells = {
+    const std::vector<stimuli::SurfaceShell> shells = {
         {std::shared_ptr<const stimuli::ClosedSurface>(std::shared_ptr<void>(), &unchecked), Pose{},
          std::move(material)}};
-    prepared = std::make_shared<const rendering::Surface>(shells);
+    prepared = std::make_shared<const stimuli::Surface>(shells);
   };
   stimuli::CleanedSurface cleaned;
   try {
@@ -504,7 +504,7 @@ bool SceneBuilder::is_surface(const stimuli::ObjectSpec& spec) {
   if (has_concave(spec)) return true;
   if (spec.shape != stimuli::ShapeKind::compound) return false;
   try {
-    std::vector<rendering::SurfaceShell> shells;
+    std::vector<stimuli::SurfaceShell> shells;
     add_shells(spec, Pose{}, false, shells);
     return has_seams(shells);
   } catch (const stimuli::MeshError&) {
@@ -551,7 +551,7 @@ std::vector<std::string> SceneBuilder::layer_notes(int object) const {
 /// \param in_object  the pose of the shape's own frame
 /// \param felt  only of what is felt of it
 void SceneBuilder::add_shells(const stimuli::ObjectSpec& spec, const Pose& in_object, bool felt,
-                              std::vector<rendering::SurfaceShell>& shells) {
+                              std::vector<stimuli::SurfaceShell>& shells) {
   if (spec.shape == stimuli::ShapeKind::compound) {
     for (const stimuli::ObjectSpec& part : spec.parts)
       add_shells(part, stimuli::compose(in_object, part.pose), felt, shells);
@@ -577,11 +577,11 @@ std::vector<rendering::MovingObject> SceneBuilder::moving_of(
     if (!spec.body) continue;
     moving.push_back({static_cast<int>(i), *spec.body, spec.pose});
     if (!is_surface(spec)) continue;
-    std::vector<rendering::SurfaceShell> felt, all;
+    std::vector<stimuli::SurfaceShell> felt, all;
     add_shells(spec, Pose{}, true, felt);
     add_shells(spec, Pose{}, false, all);
     if (felt.size() < all.size())
-      moving.back().solid = std::make_shared<const rendering::Surface>(all);
+      moving.back().solid = std::make_shared<const stimuli::Surface>(all);
   }
   return moving;
 }
@@ -643,7 +643,7 @@ std::vector<std::vector<int>> SceneBuilder::solids_of(
       auto& here = standing_here[static_cast<std::size_t>(one)];
       if (here->surface) continue;
       const stimuli::ObjectSpec& spec = objects[static_cast<std::size_t>(one)];
-      std::vector<rendering::SurfaceShell> shells;
+      std::vector<stimuli::SurfaceShell> shells;
       try {
         add_shells(spec, spec.pose, false, shells);
       } catch (const stimuli::MeshError&) {
@@ -717,7 +717,7 @@ SceneBuilder::Placed SceneBuilder::placed(const std::vector<stimuli::ObjectSpec>
     return out;
   }
   rendering::SceneSurface placed{nullptr, alone ? first.pose : Pose{}, solid.front(), {}};
-  std::vector<rendering::SurfaceShell> shells;
+  std::vector<stimuli::SurfaceShell> shells;
   for (const int object : solid) {
     const stimuli::ObjectSpec& spec = objects[static_cast<std::size_t>(object)];
     const std::size_t before = shells.size();
@@ -735,19 +735,18 @@ SceneBuilder::Placed SceneBuilder::placed(const std::vector<stimuli::ObjectSpec>
       placed.surface = known->second;
   }
   if (placed.surface == nullptr && !shells.empty())
-    placed.surface = std::make_shared<const rendering::Surface>(shells);
+    placed.surface = std::make_shared<const stimuli::Surface>(shells);
   if (!key.empty() && placed.surface != nullptr) surfaces_.emplace(key, placed.surface);
   for (const int object : solid) {
     if (!may_collide(objects, static_cast<std::size_t>(object))) continue;
     const stimuli::ObjectSpec& spec = objects[static_cast<std::size_t>(object)];
-    std::vector<rendering::SurfaceShell> own;
+    std::vector<stimuli::SurfaceShell> own;
     add_shells(spec, Pose{}, false, own);
     const bool is_felt = alone && own.size() == shells.size();
-    out.solids.push_back(
-        {is_felt ? placed.surface : std::make_shared<const rendering::Surface>(own),
-         spec.pose,
-         object,
-         {}});
+    out.solids.push_back({is_felt ? placed.surface : std::make_shared<const stimuli::Surface>(own),
+                          spec.pose,
+                          object,
+                          {}});
   }
   if (!shells.empty()) out.surfaces.push_back(std::move(placed));
   add_layers();

@@ -112,7 +112,7 @@ class SceneBuilder {
   void take_large_surface(const stimuli::ObjectSpec& spec, stimuli::PolygonSoup soup,
                           LoadedMesh& loaded);
   void add_shells(const stimuli::ObjectSpec& spec, const Pose& in_object, bool felt,
-                  std::vector<rendering::SurfaceShell>& shells);
+                  std::vector<stimuli::SurfaceShell>& shells);
   void place_layers(int object, Placing& placing);
   std::vector<Prepared> layer_of(const std::vector<PlacedShape>& shapes, double depth,
                                  const Placing& placing, Pose& pose);
@@ -129,7 +129,7 @@ class SceneBuilder {
   std::map<std::string, std::vector<Prepared>> prepared_;  ///< the parts of each shape
   std::map<std::string, LoadedMesh> meshes_;               ///< by shape
   std::map<std::string, std::shared_ptr<const stimuli::ClosedSurface>> convex_;  ///< by shape
-  std::map<std::string, std::shared_ptr<const rendering::Surface>> surfaces_;
+  std::map<std::string, std::shared_ptr<const stimuli::Surface>> surfaces_;
   LayerSurfaces layer_surfaces_;
   std::map<int, std::vector<std::string>> layer_notes_;  ///< by object, of the last build
   std::map<std::string, std::shared_ptr<const stimuli::Texture>> textures_;

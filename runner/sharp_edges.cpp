@@ -64,7 +64,7 @@ void SharpEdges::add_part(const rendering::ScenePart& part) {
 }
 
 void SharpEdges::add_surface(const rendering::PlacedSurface& placed) {
-  const rendering::Surface& surface = *placed.surface;
+  const stimuli::Surface& surface = *placed.surface;
   const auto& triangles = surface.triangles();
   std::vector<bool> on_edge(surface.vertices().size());
   const auto world = [&](std::uint32_t vertex) {
@@ -74,7 +74,7 @@ void SharpEdges::add_surface(const rendering::PlacedSurface& placed) {
     for (std::uint32_t k = 0; k < 3; ++k) {
       const std::uint32_t beyond = triangles[i].across[k];
       if (!triangles[i].owns(k)) continue;
-      const Vec3& other = triangles[rendering::SurfaceTriangle::triangle_of(beyond)].normal;
+      const Vec3& other = triangles[stimuli::SurfaceTriangle::triangle_of(beyond)].normal;
       if (!turns(triangles[i].normal, other)) continue;
       const std::uint32_t v0 = triangles[i].corners[k], v1 = triangles[i].corners[(k + 1) % 3];
       const Vec3 along = world(v1) - world(v0);

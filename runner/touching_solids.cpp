@@ -53,11 +53,11 @@ std::vector<Boxed> near(const StandingSurface& of, const StandingSurface& to, do
 
 }  // namespace
 
-StandingSurface standing(std::span<const rendering::SurfaceShell> shells) {
+StandingSurface standing(std::span<const stimuli::SurfaceShell> shells) {
   StandingSurface out;
   out.low = Vec3(HUGE_VAL);
   out.high = -out.low;
-  for (const rendering::SurfaceShell& shell : shells) {
+  for (const stimuli::SurfaceShell& shell : shells) {
     std::vector<Vec3> vertices = shell.surface->vertices;
     for (Vec3& v : vertices) {
       v = shell.pose.orientation * v + shell.pose.position;

@@ -20,7 +20,7 @@ struct StandingSurface {
   double error = 0;  ///< m, of its corners, as numbers of files and poses are rounded
 };
 
-StandingSurface standing(std::span<const rendering::SurfaceShell> shells);
+StandingSurface standing(std::span<const stimuli::SurfaceShell> shells);
 
 /// Whether two surfaces meet or cross within their errors. One that lies wholly inside the other
 /// does not: it is felt where the tool gets to it.

@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "stimuli/bounding_tree.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/exact_side.h"
 #include "stimuli/flat_faces.h"
@@ -20,22 +21,6 @@ namespace {
 
 using Index = std::uint32_t;
 using Triangle = std::array<Index, 3>;
-
-struct Box {
-  Vec3 low{std::numeric_limits<double>::max()}, high{-low};
-  void add(const Vec3& p) {
-    low = glm::min(low, p);
-    high = glm::max(high, p);
-  }
-  void add(const Box& box) {
-    low = glm::min(low, box.low);
-    high = glm::max(high, box.high);
-  }
-  bool meets(const Box& box) const {
-    return low.x <= box.high.x && box.low.x <= high.x && low.y <= box.high.y &&
-           box.low.y <= high.y && low.z <= box.high.z && box.low.z <= high.z;
-  }
-};
 
 /// A box in single precision, rounded outwards: half the memory.
 struct SmallBox {

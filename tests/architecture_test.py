@@ -110,8 +110,9 @@ def room_of(name):
 LOOKS_INSIDE = {"runner/evidence/accuracy", "runner/evidence/scenes", "runner/evidence/verification"}
 # The headers of a room that other rooms use; all others are the room's own business (and that of the rooms within).
 PUBLIC = {
-    "stimuli": "closed_surface face_triangles shapes convex_mesh grid_hull inset large_array layers/layer_surface mesh_file nearest_on_triangle orientation polygon_soup "
-               " parts/convex_parts primitives signed_distance solids/gmsh_file solids/solid_mesh texture vec",
+    "stimuli": "bounding_tree closed_surface face_triangles shapes convex_mesh grid_hull inset large_array layers/layer_surface mesh_file nearest_on_triangle orientation polygon_soup "
+               " parts/convex_parts primitives signed_distance solids/gmsh_file solids/solid_mesh solids/sparse_factor "
+               "surfaces/collision_surface surfaces/direction_cells surfaces/mass_properties surfaces/support_map surfaces/surface surfaces/surface_search texture vec",
     "rendering": "fields first_contact probe reach render_fault renderer scene scene_motion tool",
     "rendering/bodies": "moving_scene",
     "runner/evidence/verification": "explain extreme_cases random_draws random_solids reference search surface_reference surface_stroke union_cases union_search",

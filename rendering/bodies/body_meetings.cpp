@@ -206,7 +206,7 @@ void BodyMeetings::add_contact(std::uint32_t index, const Vec3& place, const Vec
                              static_cast<std::uint32_t>(state_.near_parts.size() - 1)});
 }
 
-const CollisionSurface& BodyMeetings::surface_b(const BodyPair& pair) const {
+const stimuli::CollisionSurface& BodyMeetings::surface_b(const BodyPair& pair) const {
   return pair.obstacle ? *world_.obstacles[pair.b].surface : *world_.bodies[pair.b].surface;
 }
 

@@ -43,7 +43,7 @@ class BodyMeetings {
   Pose pose_of(std::uint32_t body) const;
   Pose pose_of_other(const BodyPair& pair) const;
   const CollidingPart& part_b(const BodyPair& pair, std::uint32_t part) const;
-  const CollisionSurface& surface_b(const BodyPair& pair) const;
+  const stimuli::CollisionSurface& surface_b(const BodyPair& pair) const;
   void begin_search();
   void look_for(double within, double extra, std::span<const char> chosen, bool places);
   void look_at_pair(std::uint32_t index, double within, double extra, bool places);

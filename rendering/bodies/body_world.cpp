@@ -188,7 +188,7 @@ ConvexPlace place_of(const CollidingPart& part, const Pose& frame) {
   return place;
 }
 
-SurfacePlace place_of(const CollisionSurface& surface, const Pose& frame) {
+SurfacePlace place_of(const stimuli::CollisionSurface& surface, const Pose& frame) {
   return {&surface, glm::mat3_cast(frame.orientation), frame.position};
 }
 

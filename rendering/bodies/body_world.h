@@ -31,7 +31,7 @@ struct MovingBody {
   stimuli::Body of;
   std::vector<CollidingPart> parts;  ///< empty: neither convex nor made of convex parts
   /// In its frame; null: it meets only bodies and obstacles that have parts.
-  std::shared_ptr<const CollisionSurface> surface;
+  std::shared_ptr<const stimuli::CollisionSurface> surface;
   double radius = 0;  ///< m, about the centre of mass
   BodyMotion start;
   Pose placed;           ///< where the scene put the body's frame
@@ -41,8 +41,8 @@ struct MovingBody {
 /// One object that stands still.
 struct Obstacle {
   int object = 0;
-  std::vector<CollidingPart> parts;                 ///< as of MovingBody
-  std::shared_ptr<const CollisionSurface> surface;  ///< in the world's frame
+  std::vector<CollidingPart> parts;                          ///< as of MovingBody
+  std::shared_ptr<const stimuli::CollisionSurface> surface;  ///< in the world's frame
   Vec3 centre;
   double radius = 0;
 };
@@ -167,7 +167,7 @@ BodyWorldState initial_state(const BodyWorld& world);
 
 /// The present place of a part or surface.
 ConvexPlace place_of(const CollidingPart& part, const Pose& frame);
-SurfacePlace place_of(const CollisionSurface& surface, const Pose& frame);
+SurfacePlace place_of(const stimuli::CollisionSurface& surface, const Pose& frame);
 
 /// Moves all bodies. They move freely until a pair meets; there they bounce, and the step
 /// continues. Bodies that touch or may meet within the rest of the step are held apart by impulses

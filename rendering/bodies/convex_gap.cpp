@@ -125,7 +125,7 @@ struct Slab {
 };
 
 std::uint32_t support_of(const ConvexPlace& part, const Vec3& direction, std::uint32_t start) {
-  return support_vertex(*part.mesh, part.local_vector(direction), start);
+  return stimuli::support_vertex(*part.mesh, part.local_vector(direction), start);
 }
 
 /// \param normal  unit

@@ -42,12 +42,14 @@ struct OwnParts {
 };
 
 /// In the frame in which its own has this pose.
-std::shared_ptr<const CollisionSurface> colliding(const SceneSurface& surface, const Pose& pose) {
-  return std::make_shared<const CollisionSurface>(*surface.surface, pose);
+std::shared_ptr<const stimuli::CollisionSurface> colliding(const SceneSurface& surface,
+                                                           const Pose& pose) {
+  return std::make_shared<const stimuli::CollisionSurface>(*surface.surface, pose);
 }
 
 /// The same of convex parts.
-std::shared_ptr<const CollisionSurface> colliding(const std::vector<CollidingPart>& parts) {
+std::shared_ptr<const stimuli::CollisionSurface> colliding(
+    const std::vector<CollidingPart>& parts) {
   std::vector<Vec3> vertices;
   std::vector<std::array<std::uint32_t, 3>> triangles;
   for (const CollidingPart& part : parts) {
@@ -60,7 +62,7 @@ std::shared_ptr<const CollisionSurface> colliding(const std::vector<CollidingPar
         triangles.push_back({first + face[0], first + face[k - 1], first + face[k]});
     }
   }
-  return std::make_shared<const CollisionSurface>(std::move(vertices), triangles);
+  return std::make_shared<const stimuli::CollisionSurface>(std::move(vertices), triangles);
 }
 
 /// Gives surfaces to bodies and obstacles of convex parts, if any other has only its surface.
@@ -81,7 +83,7 @@ MovingBody make_body(const MovingObject& moving, const OwnParts& own) {
   MovingBody body;
   body.object = moving.object;
   body.of = moving.body;
-  std::vector<PlacedMesh> solids;
+  std::vector<stimuli::PlacedMesh> solids;
   const Pose to_object = inverse(moving.pose);
   for (const SceneObject& part : own.felt)
     body.stiffness = std::max(body.stiffness, part.material.stiffness);
@@ -94,13 +96,14 @@ MovingBody make_body(const MovingObject& moving, const OwnParts& own) {
   if (solids.empty() && own.surfaces.empty() && own.whole == nullptr)
     refuse(moving.object, "expected an object with a surface");
   const auto outer = std::ranges::find(own.surfaces, 0, &SceneSurface::layer);
-  const VolumeMoments moments =
-      moving.solid != nullptr ? moments_of_surface(*moving.solid, Pose{})
+  const stimuli::VolumeMoments moments =
+      moving.solid != nullptr ? stimuli::moments_of_surface(*moving.solid, Pose{})
       : outer == own.surfaces.end()
-          ? moments_of_union(solids)
-          : moments_of_surface(*outer->surface, stimuli::compose(to_object, outer->pose));
-  const MassProperties properties = moving.body.mass ? with_mass(moments, *moving.body.mass)
-                                                     : with_density(moments, *moving.body.density);
+          ? stimuli::moments_of_union(solids)
+          : stimuli::moments_of_surface(*outer->surface, stimuli::compose(to_object, outer->pose));
+  const stimuli::MassProperties properties =
+      moving.body.mass ? stimuli::with_mass(moments, *moving.body.mass)
+                       : stimuli::with_density(moments, *moving.body.density);
   try {
     body.inertia = inertia_of(properties);
   } catch (const std::invalid_argument& error) {
@@ -202,7 +205,7 @@ void check_overlaps(const BodyWorld& world) {
     const Pose frame = pair.obstacle ? Pose{} : world.bodies[pair.b].placed;
     double overlap = 0;
     if (pair.by_surface) {
-      const CollisionSurface& surface =
+      const stimuli::CollisionSurface& surface =
           pair.obstacle ? *world.obstacles[pair.b].surface : *world.bodies[pair.b].surface;
       overlap = overlap_of(place_of(*a.surface, a.placed), place_of(surface, frame));
     }

@@ -18,7 +18,7 @@ struct MovingObject {
   stimuli::Body body;
   Pose pose;  ///< of the object's frame
   /// The whole object, in its frame, for its mass; null: use its felt surface, or its convex parts.
-  std::shared_ptr<const Surface> solid = nullptr;
+  std::shared_ptr<const stimuli::Surface> solid = nullptr;
 };
 
 /// Bodies of a scene at most: a step's cost grows with the square of the number of near bodies.

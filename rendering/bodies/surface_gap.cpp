@@ -60,14 +60,15 @@ class GapSearch {
   double bound() const { return std::max(out_ != nullptr ? reach_ : least_, depth_); }
 
   template <class Visit>
-  void walk(const FeatureTree& of_a, const FeatureTree& of_b, const Visit& visit) {
+  void walk(const stimuli::FeatureTree& of_a, const stimuli::FeatureTree& of_b,
+            const Visit& visit) {
     if (of_a.empty() || of_b.empty()) return;
     std::array<std::pair<std::uint32_t, std::uint32_t>, 128> stack;
     std::size_t depth = 0;
     stack[depth++] = {0, 0};
     while (depth > 0) {
       const auto [i, k] = stack[--depth];
-      const FeatureTree::Node &a = of_a.node(i), &b = of_b.node(k);
+      const stimuli::FeatureTree::Node &a = of_a.node(i), &b = of_b.node(k);
       const Vec3 size = sizes_ * a.half;
       const Vec3 apart = glm::max(glm::abs(into_b(a.middle) - b.middle) - size - b.half, Vec3(0));
       const double limit = bound();
@@ -94,10 +95,10 @@ class GapSearch {
 
   /// \param p  the corner in the frame of the face
   /// \param corner_is_a  whether the corner is of surface a
-  void corner_to_face(const CollisionSurface& of, std::uint32_t corner,
-                      const CollisionSurface& other, std::uint32_t index, const Vec3& p,
+  void corner_to_face(const stimuli::CollisionSurface& of, std::uint32_t corner,
+                      const stimuli::CollisionSurface& other, std::uint32_t index, const Vec3& p,
                       bool corner_is_a) {
-    const CollisionSurface::Face& face = other.faces()[index];
+    const stimuli::CollisionSurface::Face& face = other.faces()[index];
     const double height = glm::dot(face.normal, p) - face.offset, limit = bound();
     if (height > limit) return;
     bool over = true;
@@ -134,7 +135,7 @@ class GapSearch {
         side = k;
     }
     const std::uint32_t across = face.across[side];
-    if (across == CollisionSurface::kNone || across < index) return;
+    if (across == stimuli::CollisionSurface::kNone || across < index) return;
     for (const std::uint32_t f : {index, across}) {
       for (const std::uint32_t v : other.faces()[f].corners) {
         const Vec3 beside = other.vertices()[v] - nearest;
@@ -145,7 +146,8 @@ class GapSearch {
     add(0.5 * (p + nearest), normal, distance, corner_is_a);
   }
 
-  void edge_to_edge(const CollisionSurface::Edge& a, const CollisionSurface::Edge& b) {
+  void edge_to_edge(const stimuli::CollisionSurface::Edge& a,
+                    const stimuli::CollisionSurface::Edge& b) {
     const Vec3 p = into_b(a_.vertices()[a.ends[0]]),
                u = axes_ * (a_.vertices()[a.ends[1]] - a_.vertices()[a.ends[0]]);
     const Vec3 &q = b_.vertices()[b.ends[0]], v = b_.vertices()[b.ends[1]] - q;
@@ -176,7 +178,8 @@ class GapSearch {
   }
 
   /// Whether a face lies between a place and its possible entry on the surface.
-  static bool hidden(const CollisionSurface& surface, const Vec3& from, const Vec3& along) {
+  static bool hidden(const stimuli::CollisionSurface& surface, const Vec3& from,
+                     const Vec3& along) {
     bool hides = false;
     surface.crossings(from, along, [&](double t, std::uint32_t) { hides |= t < 1 - 1e-6; });
     return hides;
@@ -197,7 +200,7 @@ class GapSearch {
       out_->all.push_back({place, normal, gap});
   }
 
-  const CollisionSurface &a_, &b_;
+  const stimuli::CollisionSurface &a_, &b_;
   Mat3 axes_, back_;  ///< from a to b; its inverse
   Vec3 position_;
   Mat3 sizes_;  ///< absolute values of axes_
@@ -244,8 +247,8 @@ void choose_of(std::span<const NearPlace> places, double turn, std::vector<NearP
 }
 
 /// The middle of the solid under a point of a face, in its own frame.
-Vec3 middle_under(const CollisionSurface& surface, const CollisionSurface::Face& face,
-                  const Vec3& point) {
+Vec3 middle_under(const stimuli::CollisionSurface& surface,
+                  const stimuli::CollisionSurface::Face& face, const Vec3& point) {
   const Vec3 along = -4 * glm::length(surface.face_tree().node(0).half) * face.normal;
   double first = 1;
   surface.crossings(point, along, [&](double t, std::uint32_t) {
@@ -265,13 +268,13 @@ double depth_inside(const SurfacePlace& a, const SurfacePlace& b) {
   };
   const auto at = [&](std::uint32_t v) { return axes * a.surface->vertices()[v] + position; };
   for (std::uint32_t v = 0; v < a.surface->vertices().size(); ++v) {
-    if (a.surface->face_of(v) != CollisionSurface::kNone) look(at(v));
+    if (a.surface->face_of(v) != stimuli::CollisionSurface::kNone) look(at(v));
   }
   std::vector<double> crossed;
   for (std::uint32_t f = 0; f < a.surface->faces().size(); ++f) {
-    const CollisionSurface::Face& face = a.surface->faces()[f];
+    const stimuli::CollisionSurface::Face& face = a.surface->faces()[f];
     for (std::size_t k = 0; k < 3; ++k) {
-      if (face.across[k] != CollisionSurface::kNone && face.across[k] < f) continue;
+      if (face.across[k] != stimuli::CollisionSurface::kNone && face.across[k] < f) continue;
       const Vec3 from = at(face.corners[k]), along = at(face.corners[(k + 1) % 3]) - from;
       crossed.assign({0, 1});
       b.surface->crossings(from, along, [&](double t, std::uint32_t) { crossed.push_back(t); });

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "rendering/bodies/collision_surface.h"
+#include "stimuli/surfaces/collision_surface.h"
 #include "stimuli/vec.h"
 
 namespace palpate::rendering {
@@ -17,7 +17,7 @@ struct GapLimits {
 
 /// A surface at its present place.
 struct SurfacePlace {
-  const CollisionSurface* surface = nullptr;
+  const stimuli::CollisionSurface* surface = nullptr;
   Mat3 axes;      ///< rotation from its frame
   Vec3 position;  ///< of its origin
 };

@@ -41,7 +41,7 @@ void add_surface(const rendering::PlacedSurface& placed, std::vector<SurfaceTria
     return placed.world_vector(placed.surface->vertices()[vertex]) + placed.position;
   };
   for (const std::uint32_t i : placed.surface->file_order()) {
-    const rendering::SurfaceTriangle& t = placed.surface->triangles()[i];
+    const stimuli::SurfaceTriangle& t = placed.surface->triangles()[i];
     triangles.push_back({world(t.corners[0]), world(t.corners[1]), world(t.corners[2])});
   }
 }

@@ -28,7 +28,7 @@ std::vector<CornerTriangle> corners_of(std::span<const PlacedShell> shells) {
 double slack_of(std::span<const PlacedShell> shells, const TriangleTree& tree) {
   double error = 0;
   for (const PlacedShell& shell : shells) error = std::max(error, shell.surface->coordinate_error);
-  return tree.empty() ? 0 : kAbutting * glm::length(tree.high() - tree.low()) + 4 * error;
+  return tree.empty() ? 0 : kAbutting * glm::length(tree.box().high - tree.box().low) + 4 * error;
 }
 
 Vec3 twice_area(const CornerTriangle& t) { return glm::cross(t[1] - t[0], t[2] - t[0]); }
@@ -116,7 +116,7 @@ class ExposedPieces {
     const auto& own = corners_[tree_.given()[i]];
     const Vec3 low = glm::min(t[0], glm::min(t[1], t[2])) - slack_;
     const Vec3 high = glm::max(t[0], glm::max(t[1], t[2])) + slack_;
-    tree_.for_each_near(low, high, [&](std::uint32_t k) {
+    tree_.for_each_near({low, high}, [&](std::uint32_t k) {
       if (k == i) return true;
       const auto& other = corners_[tree_.given()[k]];
       for (const std::uint32_t v : own) {
@@ -254,7 +254,7 @@ bool SolidDepth::plane_in(const Vec3& centre, double radius) const {
   // What may be nearest to a point of the ball. If all of it is in one plane, so is the border of
   // the face, which others share: it is out of reach.
   const double reach = nearest.distance + 2 * radius;
-  return tree().for_each_near(centre - reach, centre + reach, [&](std::uint32_t i) {
+  return tree().for_each_near({centre - reach, centre + reach}, [&](std::uint32_t i) {
     const CornerTriangle& t = tree().triangles()[i];
     bool in_plane = true;
     for (const Vec3& corner : t) in_plane &= std::abs(glm::dot(normal, corner - face[0])) <= slack_;

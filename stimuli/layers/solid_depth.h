@@ -5,7 +5,7 @@
 #include <span>
 
 #include "stimuli/closed_surface.h"
-#include "stimuli/layers/triangle_tree.h"
+#include "stimuli/triangle_tree.h"
 
 namespace palpate::stimuli {
 
@@ -36,9 +36,9 @@ class SolidDepth {
   /// linear.
   bool plane_in(const Vec3& centre, double radius) const;
 
-  bool empty() const { return tree().empty(); }  ///< no volume
-  Vec3 low() const { return tree().low(); }      ///< m, of the box about it
-  Vec3 high() const { return tree().high(); }    ///< m
+  bool empty() const { return tree().empty(); }    ///< no volume
+  Vec3 low() const { return tree().box().low; }    ///< m, of the box about it
+  Vec3 high() const { return tree().box().high; }  ///< m
   /// m; parts nearer than this abut: there is no surface between them.
   double slack() const { return slack_; }
 

@@ -193,8 +193,8 @@ SolidMesh mesh_of_primitive(const ObjectSpec& spec, int resolution) {
   throw std::invalid_argument("no hexahedra for this shape");
 }
 
-std::vector<SurfaceTriangle> surface_of(const SolidMesh& mesh) {
-  std::vector<SurfaceTriangle> surface;
+std::vector<SolidFace> surface_of(const SolidMesh& mesh) {
+  std::vector<SolidFace> surface;
   OpenFaces<4> squares;
   for (const Hexahedron& element : mesh.hexahedra) {
     for (const auto& f : kHexahedronFaces)

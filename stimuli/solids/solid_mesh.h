@@ -15,7 +15,7 @@ using Hexahedron = std::array<std::uint32_t, 8>;
 /// Corners 0 to 3, then the middles of the edges 01, 12, 02, 03, 13, 23; seen from corner 3 the
 /// corners 0, 1, 2 are counter-clockwise.
 using QuadraticTetrahedron = std::array<std::uint32_t, 10>;
-using SurfaceTriangle = std::array<std::uint32_t, 3>;  ///< nodes, counter-clockwise from outside
+using SolidFace = std::array<std::uint32_t, 3>;  ///< nodes, counter-clockwise from outside
 
 struct SolidMesh {
   std::vector<Vec3> nodes;
@@ -37,6 +37,6 @@ SolidMesh mesh_of_box(const Vec3& size, const std::array<int, 3>& counts);
 
 /// The triangles that bound the solid: two for each face of a hexahedron that no other shares, four
 /// for a quadratic tetrahedron's.
-std::vector<SurfaceTriangle> surface_of(const SolidMesh& mesh);
+std::vector<SolidFace> surface_of(const SolidMesh& mesh);
 
 }  // namespace palpate::stimuli

@@ -45,10 +45,10 @@ struct Query {
 };
 
 /// By every triangle, from either side.
-double first_meeting(const rendering::Surface& surface, const Vec3& from, const Vec3& to) {
+double first_meeting(const stimuli::Surface& surface, const Vec3& from, const Vec3& to) {
   double first = kNone;
   const Vec3 way = to - from;
-  for (const rendering::SurfaceTriangle& t : surface.triangles()) {
+  for (const stimuli::SurfaceTriangle& t : surface.triangles()) {
     const double a = glm::dot(t.normal, from) - t.offset, b = glm::dot(t.normal, to) - t.offset;
     if ((a > 0) == (b > 0)) continue;
     double least = HUGE_VAL, most = -HUGE_VAL;
@@ -108,8 +108,8 @@ stimuli::PolygonSoup bumpy_ball(int subdivisions) {
 
 class Bullet {
  public:
-  explicit Bullet(const rendering::Surface& surface) {
-    for (const rendering::SurfaceTriangle& t : surface.triangles())
+  explicit Bullet(const stimuli::Surface& surface) {
+    for (const stimuli::SurfaceTriangle& t : surface.triangles())
       mesh_.addTriangle(corner(surface, t, 0), corner(surface, t, 1), corner(surface, t, 2));
     shape_ = std::make_unique<btBvhTriangleMeshShape>(&mesh_, false);
   }
@@ -131,7 +131,7 @@ class Bullet {
   static btVector3 to_bullet(const Vec3& v) {
     return {v.x / kRadius, v.y / kRadius, v.z / kRadius};
   }
-  static btVector3 corner(const rendering::Surface& surface, const rendering::SurfaceTriangle& t,
+  static btVector3 corner(const stimuli::Surface& surface, const stimuli::SurfaceTriangle& t,
                           std::size_t k) {
     return to_bullet(surface.vertices()[t.corners[k]]);
   }
@@ -141,11 +141,11 @@ class Bullet {
 
 class Fcl {
  public:
-  explicit Fcl(const rendering::Surface& surface) {
+  explicit Fcl(const stimuli::Surface& surface) {
     std::vector<fcl::Vector3d> vertices;
     std::vector<fcl::Triangle> triangles;
     for (const Vec3& v : surface.vertices()) vertices.emplace_back(to_fcl(v));
-    for (const rendering::SurfaceTriangle& t : surface.triangles())
+    for (const stimuli::SurfaceTriangle& t : surface.triangles())
       triangles.emplace_back(t.corners[0], t.corners[1], t.corners[2]);
     model_.beginModel();
     model_.addSubModel(vertices, triangles);
@@ -171,10 +171,10 @@ class Fcl {
 
 void compare(int subdivisions, std::size_t count) {
   const stimuli::PolygonSoup soup = bumpy_ball(subdivisions);
-  const std::vector<rendering::SurfaceShell> shells = {
+  const std::vector<stimuli::SurfaceShell> shells = {
       {std::make_shared<const stimuli::ClosedSurface>(stimuli::closed_surface(soup).surface),
        Pose{}, stimuli::Material{}}};
-  const auto surface = std::make_shared<const rendering::Surface>(shells);
+  const auto surface = std::make_shared<const stimuli::Surface>(shells);
   const Bullet bullet(*surface);
   const Fcl fcl(*surface);
   for (const bool segment : {false, true}) {

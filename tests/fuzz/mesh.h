@@ -7,12 +7,12 @@
 #include <utility>
 #include <vector>
 
-#include "rendering/surface.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/mesh_file.h"
 #include "stimuli/parts/convex_parts.h"
 #include "stimuli/polygon_soup.h"
+#include "stimuli/surfaces/surface.h"
 #include "tests/fuzz/feel.h"
 #include "tests/fuzz/input_file.h"
 
@@ -54,10 +54,10 @@ inline void feel_mesh_file(const std::string& path) {
     } else if (closed) {
       stimuli::Material material;
       material.stiffness = 1000;
-      const std::vector<rendering::SurfaceShell> shells = {
+      const std::vector<stimuli::SurfaceShell> shells = {
           {std::make_shared<const stimuli::ClosedSurface>(std::move(*closed)), Pose{}, material,
            0}};
-      surfaces.push_back({std::make_shared<const rendering::Surface>(shells), Pose{}, 0, {}});
+      surfaces.push_back({std::make_shared<const stimuli::Surface>(shells), Pose{}, 0, {}});
     }
     for (const rendering::Renderer* renderer :
          {&rendering::point_renderer(), &rendering::ray_renderer()}) {

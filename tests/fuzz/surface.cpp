@@ -2,7 +2,7 @@
 // tool is never inside, and the force is stiffness times its displacement. The oracle knows the
 // cells alone.
 
-#include "rendering/surface.h"
+#include "stimuli/surfaces/surface.h"
 
 #include <algorithm>
 #include <array>
@@ -158,13 +158,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   }
   stimuli::Material material;
   material.stiffness = kStiffness;
-  const std::vector<SurfaceShell> shells = {
+  const std::vector<stimuli::SurfaceShell> shells = {
       {std::make_shared<const stimuli::ClosedSurface>(
            stimuli::closed_surface(surface_of(cells, turn, rounded)).surface),
        Pose{}, material}};
   const Renderer& renderer = point ? point_renderer() : ray_renderer();
   const Scene scene({}, true, tool, nullptr,
-                    {{std::make_shared<const Surface>(shells), Pose{}, 0}});
+                    {{std::make_shared<const stimuli::Surface>(shells), Pose{}, 0}});
   RenderState state = scene.initial_state();
   const Quat back = glm::conjugate(turn);
   const double room = rounded ? 1e-7 : 1e-9;

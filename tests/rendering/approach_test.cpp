@@ -108,7 +108,7 @@ TEST(Approach, WhirledStylusEndsAsLookingEverywhereDoes) {
 
 TEST(SupportMap, LeadsToTheFarthestVertexInFewSteps) {
   const stimuli::ConvexMesh mesh(stimuli::icosphere(0.03, 6));
-  const SupportMap map(mesh);
+  const stimuli::SupportMap map(mesh);
   ASSERT_FALSE(map.empty());
   constexpr std::uint64_t kSeed = 5;
   Random random(kSeed);
@@ -118,12 +118,13 @@ TEST(SupportMap, LeadsToTheFarthestVertexInFewSteps) {
     double best = -1;
     for (const Vec3& vertex : mesh.vertices()) best = std::max(best, glm::dot(vertex, direction));
     EXPECT_EQ(
-        glm::dot(mesh.vertices()[support_vertex(mesh, direction, map.near_support(direction))],
-                 direction),
+        glm::dot(
+            mesh.vertices()[stimuli::support_vertex(mesh, direction, map.near_support(direction))],
+            direction),
         best);
     EXPECT_GT(glm::dot(near, direction), 3 * 0.03 * std::cos(0.06));  // a cell: some 0.06 rad
   }
-  EXPECT_TRUE(SupportMap(stimuli::ConvexMesh(stimuli::cube(0.1))).empty());
+  EXPECT_TRUE(stimuli::SupportMap(stimuli::ConvexMesh(stimuli::cube(0.1))).empty());
 }
 
 }  // namespace

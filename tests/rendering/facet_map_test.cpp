@@ -1,6 +1,8 @@
 // The starts of walks over a large mesh: near the sought place on any shape, and without effect on
 // anything but time.
 
+#include "rendering/facet_map.h"
+
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -11,7 +13,6 @@
 #include <set>
 #include <vector>
 
-#include "rendering/direction_maps.h"
 #include "rendering/near_pairs.h"
 #include "rendering/renderer.h"
 #include "stimuli/convex_mesh.h"
@@ -138,12 +139,12 @@ TEST(SupportMap, ClimbsFromItEndOnTheExtremeVertex) {
   constexpr std::uint64_t kSeed = 9;
   Random random(kSeed);
   for (const Mesh& mesh : meshes) {
-    const SupportMap map(*mesh, 0);
+    const stimuli::SupportMap map(*mesh, 0);
     for (int i = 0; i < 50; ++i) {
       const Vec3 n = testing::random_direction(random);
       double highest = -HUGE_VAL;
       for (const Vec3& v : mesh->vertices()) highest = std::max(highest, glm::dot(n, v));
-      const std::uint32_t found = support_vertex(*mesh, n, map.near_support(n));
+      const std::uint32_t found = stimuli::support_vertex(*mesh, n, map.near_support(n));
       EXPECT_GE(glm::dot(n, mesh->vertices()[found]), highest - 1e-15 * mesh->size());
     }
   }

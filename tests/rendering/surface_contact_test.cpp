@@ -15,13 +15,13 @@
 
 #include "data/base/random.h"
 #include "rendering/surface_patch.h"
-#include "rendering/surface_search.h"
 #include "runner/evidence/tick_meters.h"
 #include "runner/evidence/verification/surface_stroke.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/orientation.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
+#include "stimuli/surfaces/surface_search.h"
 #include "tests/shared/random_polyhedron.h"
 #include "tests/shared/union_scenes.h"
 
@@ -43,13 +43,13 @@ stimuli::Material spring() {
 }
 
 SceneSurface surface_of(const std::vector<stimuli::PolygonSoup>& soups) {
-  std::vector<SurfaceShell> shells;
+  std::vector<stimuli::SurfaceShell> shells;
   shells.reserve(soups.size());
   for (const stimuli::PolygonSoup& soup : soups)
     shells.push_back(
         {std::make_shared<const stimuli::ClosedSurface>(stimuli::closed_surface(soup).surface),
          Pose{}, spring()});
-  return {std::make_shared<const Surface>(shells), Pose{}, 0};
+  return {std::make_shared<const stimuli::Surface>(shells), Pose{}, 0};
 }
 
 Scene scene_of(const std::vector<stimuli::PolygonSoup>& soups, const Tool& tool = {}) {
@@ -138,9 +138,9 @@ stimuli::PolygonSoup as_in_a_file(stimuli::PolygonSoup soup, Random& random) {
 }
 
 /// m, by which a segment goes through the surface; 0: it does not.
-double through(const Surface& surface, const Vec3& start, const Vec3& along) {
+double through(const stimuli::Surface& surface, const Vec3& start, const Vec3& along) {
   double worst = 0;
-  for (const SurfaceTriangle& t : surface.triangles()) {
+  for (const stimuli::SurfaceTriangle& t : surface.triangles()) {
     const double a = glm::dot(t.normal, start) - t.offset, b = a + glm::dot(t.normal, along);
     if (a * b >= 0) continue;
     const Vec3 crossing = start + a / (a - b) * along;
@@ -156,9 +156,9 @@ double through(const Surface& surface, const Vec3& start, const Vec3& along) {
   return worst;
 }
 
-double distance(const Surface& surface, const Vec3& p) {
+double distance(const stimuli::Surface& surface, const Vec3& p) {
   double least = HUGE_VAL;
-  for (const SurfaceTriangle& t : surface.triangles()) {
+  for (const stimuli::SurfaceTriangle& t : surface.triangles()) {
     PatchPolygon polygon;
     polygon.count = 3;
     for (std::size_t k = 0; k < 3; ++k) polygon.corners[k] = surface.vertices()[t.corners[k]];
@@ -171,12 +171,12 @@ double distance(const Surface& surface, const Vec3& p) {
 /// A hand that presses at random places, slides on and turns.
 class Hand {
  public:
-  Hand(const Surface& surface, Random& random) : surface_(surface), random_(random) {}
+  Hand(const stimuli::Surface& surface, Random& random) : surface_(surface), random_(random) {}
   LineProbe next() {
     if (ticks_++ % 50 == 0) {
       const auto pick = static_cast<std::size_t>(random_.unit() *
                                                  static_cast<double>(surface_.triangles().size()));
-      const SurfaceTriangle& t = surface_.triangles()[pick];
+      const stimuli::SurfaceTriangle& t = surface_.triangles()[pick];
       Vec3 middle(0);
       for (const std::uint32_t corner : t.corners) middle += surface_.vertices()[corner] / 3.0;
       goal_ = middle + (ticks_ % 1000 == 1 ? 0.05 : 0.005 * random_.unit() - 0.004) * t.normal;
@@ -191,7 +191,7 @@ class Hand {
   }
 
  private:
-  const Surface& surface_;
+  const stimuli::Surface& surface_;
   Random& random_;
   Vec3 tip_{0, 0, 0.15}, along_{0, 0, 1}, goal_, turn_{0, 0, 1};
   double step_ = 0;
@@ -221,7 +221,7 @@ TEST_P(SurfaceContact, TheIdealToolIsNeverInside) {
         round % 2 == 0 ? torus(12 + round, 8, 0.03, 0.01) : stairs(random, 2 + round % 3, 0.05),
         random);
     const SceneSurface placed = surface_of({soup});
-    const Surface& surface = *placed.surface;
+    const stimuli::Surface& surface = *placed.surface;
     const Scene scene({}, true, {}, nullptr, {placed});
     RenderState state = scene.initial_state();
     Hand hand(surface, random);
@@ -369,12 +369,12 @@ stimuli::ClosedSurface cube_with_flat_triangles(bool two) {
 TEST_P(SurfaceContact, TrianglesWithoutAreaLeaveNoGap) {
   if (!GetParam()->side_contact()) return;
   for (const bool two : {false, true}) {
-    const std::vector<SurfaceShell> shells = {
+    const std::vector<stimuli::SurfaceShell> shells = {
         {std::make_shared<const stimuli::ClosedSurface>(cube_with_flat_triangles(two)), Pose{},
          spring()}};
-    const auto surface = std::make_shared<const Surface>(shells);
+    const auto surface = std::make_shared<const stimuli::Surface>(shells);
     int flat = 0;
-    for (const SurfaceTriangle& t : surface->triangles()) {
+    for (const stimuli::SurfaceTriangle& t : surface->triangles()) {
       const auto at = [&](std::size_t k) { return surface->vertices()[t.corners[k]]; };
       if (glm::length(glm::cross(at(1) - at(0), at(2) - at(0))) > 1e-12) continue;
       ++flat;
@@ -712,7 +712,7 @@ stimuli::PolygonSoup wavy_ball(int subdivisions) {
 /// A hand whose stylus turns by degrees from tick to tick, over triangles of half a millimetre.
 TEST_P(SurfaceContact, FastTurningStylusDoesNotEnterFineMeshes) {
   const SceneSurface placed = surface_of({wavy_ball(5)});
-  const Surface& surface = *placed.surface;
+  const stimuli::Surface& surface = *placed.surface;
   const Scene scene({}, true, {}, nullptr, {placed});
   RenderState state = scene.initial_state();
   runner::evidence::SurfaceStrokeSettings settings;
@@ -845,16 +845,16 @@ TEST(SurfaceTree, FindsAllThatAMovingSegmentCanTouch) {
   constexpr std::uint64_t kSeed = 23;
   Random random(kSeed);
   const SceneSurface placed = surface_of({wavy_ball(3)});
-  const Surface& surface = *placed.surface;
+  const stimuli::Surface& surface = *placed.surface;
   int sides = 0;
   for (int i = 0; i < 20000; ++i) {
     const auto index =
         static_cast<std::uint32_t>(random.unit() * static_cast<double>(surface.triangles().size()));
-    const SurfaceTriangle& t = surface.triangles()[index];
+    const stimuli::SurfaceTriangle& t = surface.triangles()[index];
     const auto corner = [&](std::uint32_t k) { return surface.vertices()[t.corners[k % 3]]; };
     const double length = 0.2 * random.unit();
     Vec3 start, end;
-    std::uint8_t expected = i % 4 == 0 ? surface_pair::kTail : surface_pair::kTip;
+    std::uint8_t expected = i % 4 == 0 ? stimuli::surface_pair::kTail : stimuli::surface_pair::kTip;
     if (i % 2 == 0) {  // an end on the triangle
       const double a = random.unit(), b = (1 - a) * random.unit();
       start = corner(0) + a * (corner(1) - corner(0)) + b * (corner(2) - corner(0));
@@ -864,17 +864,18 @@ TEST(SurfaceTree, FindsAllThatAMovingSegmentCanTouch) {
       const auto k = static_cast<std::uint32_t>(i / 2 % 3);
       if (!t.owns(k) || !t.touches(k)) continue;
       const Vec3 e = corner(k + 1) - corner(k);
-      const Vec3& other = surface.triangles()[SurfaceTriangle::triangle_of(t.across[k])].normal;
+      const Vec3& other =
+          surface.triangles()[stimuli::SurfaceTriangle::triangle_of(t.across[k])].normal;
       const Vec3 along = length * glm::normalize(glm::cross(t.normal + other, glm::normalize(e)) +
                                                  (random.unit() - 0.5) * glm::normalize(e));
       if (glm::dot(t.normal, along) * glm::dot(other, along) >= 0) continue;
       start = corner(k) + random.unit() * e - random.unit() * along;
       end = start + along;
-      expected = surface_pair::kSides;
+      expected = stimuli::surface_pair::kSides;
       ++sides;
     }
     // The pose is some way along a motion, and off it by less than the room.
-    SegmentMotion motion;
+    stimuli::SegmentMotion motion;
     motion.room = (i % 5 == 0 ? 5e-3 : 1e-5) * random.unit();
     const double time = random.unit();
     if (i % 3 > 0) {

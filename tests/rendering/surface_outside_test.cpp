@@ -14,11 +14,11 @@
 
 #include "data/base/random.h"
 #include "rendering/renderer.h"
-#include "rendering/surface.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/orientation.h"
 #include "stimuli/polygon_soup.h"
 #include "stimuli/primitives.h"
+#include "stimuli/surfaces/surface.h"
 #include "tests/rendering/winding_oracle.h"
 #include "tests/shared/probe_paths.h"
 #include "tests/shared/random_polyhedron.h"
@@ -345,8 +345,8 @@ void SurfaceOutside::touch(const Segments& segments, std::uint64_t seed) {
   const WindingOracle oracle(*mesh);
   stimuli::Material spring;
   spring.stiffness = kStiffness;
-  const std::vector<SurfaceShell> shells = {{mesh, Pose{}, spring}};
-  const auto surface = std::make_shared<const Surface>(shells);
+  const std::vector<stimuli::SurfaceShell> shells = {{mesh, Pose{}, spring}};
+  const auto surface = std::make_shared<const stimuli::Surface>(shells);
   const double rounding = 1e-9 * oracle.size();  // m; places nearer to the outside are not judged
   const double farther = 2e-6 + 4 * surface->seam() + (kind.make == folded_plate ? kPocket : 0);
   const auto inside = [&](const Pose& at, double depth) {
@@ -482,8 +482,9 @@ int through(PolygonSoup soup, bool sides, Random& random, int& tried) {
   };
   stimuli::Material spring;
   spring.stiffness = kStiffness;
-  const std::vector<SurfaceShell> shells = {{mesh, Pose{}, spring}};
-  const Scene scene({}, sides, {}, nullptr, {{std::make_shared<const Surface>(shells), Pose{}, 0}});
+  const std::vector<stimuli::SurfaceShell> shells = {{mesh, Pose{}, spring}};
+  const Scene scene({}, sides, {}, nullptr,
+                    {{std::make_shared<const stimuli::Surface>(shells), Pose{}, 0}});
   const ExactAim aim(*mesh, sides);
   int out = 0;
   for (int i = 0; i < kTries; ++i) {

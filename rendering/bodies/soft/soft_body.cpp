@@ -27,10 +27,10 @@ std::vector<std::uint32_t> unmarked(const std::vector<bool>& marks) {
 }
 
 /// Mass / step^2 + (1 + damping / step) stiffness, of the free nodes.
-Factor factorised(const Solid& solid, const std::vector<bool>& is_fixed,
-                  const std::vector<std::uint32_t>& free, const SoftSettings& settings) {
+stimuli::Factor factorised(const Solid& solid, const std::vector<bool>& is_fixed,
+                           const std::vector<std::uint32_t>& free, const SoftSettings& settings) {
   std::vector<std::uint32_t> row(is_fixed.size());
-  std::vector<MatrixEntry> entries;
+  std::vector<stimuli::MatrixEntry> entries;
   for (std::uint32_t i = 0; i < free.size(); ++i) {
     row[free[i]] = 3 * i;
     const double mass = solid.masses()[free[i]];
@@ -90,7 +90,7 @@ SoftBody::SoftBody(stimuli::SolidMesh mesh, const std::vector<std::uint32_t>& fi
 
 void SoftBody::find_surface() {
   surface_index_.assign(mesh_.nodes.size(), kInside);
-  for (const stimuli::SurfaceTriangle& triangle : surface_) {
+  for (const stimuli::SolidFace& triangle : surface_) {
     for (const std::uint32_t node : triangle) {
       if (surface_index_[node] != kInside) continue;
       surface_index_[node] = static_cast<std::uint32_t>(surface_nodes_.size());
@@ -100,7 +100,7 @@ void SoftBody::find_surface() {
 }
 
 void SoftBody::find_compliance() {
-  constexpr std::size_t kTogether = Factor::kTogether;
+  constexpr std::size_t kTogether = stimuli::Factor::kTogether;
   const std::size_t count = surface_nodes_.size(), size = factor_.size();
   std::vector<std::uint32_t> row(mesh_.nodes.size());
   for (std::uint32_t i = 0; i < free_nodes_.size(); ++i) row[free_nodes_[i]] = 3 * i;

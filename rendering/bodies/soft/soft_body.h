@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "rendering/bodies/soft/elastic_solid.h"
-#include "rendering/bodies/soft/sparse_factor.h"
 #include "stimuli/solids/solid_mesh.h"
+#include "stimuli/solids/sparse_factor.h"
 #include "stimuli/vec.h"
 
 namespace palpate::rendering {
@@ -64,7 +64,7 @@ class SoftBody {
   const Solid& solid() const { return solid_; }
   const stimuli::SolidMesh& mesh() const { return mesh_; }
   const SoftSettings& settings() const { return settings_; }
-  const std::vector<stimuli::SurfaceTriangle>& surface() const { return surface_; }
+  const std::vector<stimuli::SolidFace>& surface() const { return surface_; }
   /// Nodes of the surface; a surface node is an index into this.
   const std::vector<std::uint32_t>& surface_nodes() const { return surface_nodes_; }
   static constexpr std::uint32_t kInside = 0xffffffff;
@@ -101,8 +101,8 @@ class SoftBody {
   double extent_ = 0;  ///< m, of the body at rest, from its first node
   std::vector<bool> is_fixed_;
   std::vector<std::uint32_t> free_nodes_;
-  Factor factor_;
-  std::vector<stimuli::SurfaceTriangle> surface_;
+  stimuli::Factor factor_;
+  std::vector<stimuli::SolidFace> surface_;
   std::vector<std::uint32_t> surface_nodes_, surface_index_;
   std::vector<float> compliance_;
 };

@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
-#include <limits>
 #include <map>
 #include <numeric>
 #include <utility>
@@ -21,12 +20,9 @@ void halve(std::vector<std::uint32_t>& order, std::size_t from, std::size_t to,
     ends.push_back(to);
     return;
   }
-  Vec3 low(std::numeric_limits<double>::infinity()), high = -low;
-  for (std::size_t i = from; i < to; ++i) {
-    low = glm::min(low, places[order[i]]);
-    high = glm::max(high, places[order[i]]);
-  }
-  const Vec3 size = high - low;
+  stimuli::Box box;
+  for (std::size_t i = from; i < to; ++i) box.add(places[order[i]]);
+  const Vec3 size = box.high - box.low;
   const int axis = size.x >= size.y && size.x >= size.z ? 0 : (size.y >= size.z ? 1 : 2);
   std::stable_sort(
       order.begin() + static_cast<std::ptrdiff_t>(from),
@@ -43,7 +39,7 @@ SoftSurface::SoftSurface(const SoftBody& body) {
   const auto& surface = body.surface();
   std::vector<Vec3> places;
   places.reserve(surface.size());
-  for (const stimuli::SurfaceTriangle& t : surface) {
+  for (const stimuli::SolidFace& t : surface) {
     places.push_back((body.mesh().nodes[t[0]] + body.mesh().nodes[t[1]] + body.mesh().nodes[t[2]]) /
                      3.0);
   }
@@ -104,12 +100,10 @@ void SoftSurface::look(const SoftBody& body, const SoftState& state,
     view.normals[t] = length > 0 ? normal / length : Vec3(0);
   }
   for (std::size_t c = 0; c < clusters_.size(); ++c) {
-    SoftView::Box box{Vec3(std::numeric_limits<double>::infinity()),
-                      Vec3(-std::numeric_limits<double>::infinity())};
+    stimuli::Box box;
     const auto add = [&](std::uint32_t node) {
-      const Vec3 later = view.x[node] + 2.0 * view.ahead[node];
-      box.low = glm::min(box.low, glm::min(view.x[node], later));
-      box.high = glm::max(box.high, glm::max(view.x[node], later));
+      box.add(view.x[node]);
+      box.add(view.x[node] + 2.0 * view.ahead[node]);
     };
     const Cluster& of = clusters_[c];
     for (std::uint32_t t = of.first_triangle; t < of.first_triangle + of.triangles; ++t) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "rendering/bodies/soft/soft_body.h"
+#include "stimuli/bounding_tree.h"
 #include "stimuli/vec.h"
 
 namespace palpate::rendering {
@@ -17,10 +18,7 @@ struct SoftView {
   std::vector<Vec3> x, ahead;
   std::vector<Vec3> by_load;  ///< the part of a node's place due to the load, by the compliance
   std::vector<Vec3> normals;  ///< of the triangles, outwards, unit; zero for a flat one
-  struct Box {
-    Vec3 low, high;
-  };
-  std::vector<Box> boxes;  ///< of the clusters, at x and two steps later
+  std::vector<stimuli::Box> boxes;  ///< of the clusters, at x and two steps later
 };
 
 /// Immutable.

@@ -356,7 +356,7 @@ void SceneDrawing::add_layers(const rendering::Scene& scene) {
   for (const rendering::PlacedSurface& placed : scene.surfaces()) {
     if (placed.layer < 1) continue;
     for (const std::uint32_t t : placed.surface->file_order()) {
-      const rendering::SurfaceTriangle& triangle = placed.surface->triangles()[t];
+      const stimuli::SurfaceTriangle& triangle = placed.surface->triangles()[t];
       const auto object = static_cast<std::size_t>(placed.of_shell[triangle.shell]);
       auto& layers = found[object];
       layers.resize(std::max(layers.size(), static_cast<std::size_t>(placed.layer)));

@@ -5,10 +5,9 @@
 #include <glm/geometric.hpp>
 #include <memory>
 
-#include "rendering/direction_maps.h"
-#include "rendering/separation.h"
 #include "runner/evidence/accuracy/peers.h"
 #include "stimuli/convex_mesh.h"
+#include "stimuli/surfaces/support_map.h"
 
 namespace palpate::runner::evidence::peers {
 
@@ -32,14 +31,14 @@ class Hull {
   Vec3 support(const Vec3& direction) const {
     // Libraries may pass a zero direction.
     const Vec3 asked = glm::dot(direction, direction) > 0 ? direction : Vec3(1, 0, 0);
-    const std::uint32_t vertex = rendering::support_vertex(mesh_, asked, map_.near_support(asked));
+    const std::uint32_t vertex = stimuli::support_vertex(mesh_, asked, map_.near_support(asked));
     return scale_.to_unit(mesh_.vertices()[vertex]);
   }
 
  private:
   const stimuli::ConvexMesh& mesh_;
   Scale scale_;
-  rendering::SupportMap map_;
+  stimuli::SupportMap map_;
 };
 
 struct Segment {

@@ -136,8 +136,8 @@ void add_part(const rendering::ScenePart& part, int shell, Solid& out) {
 }
 
 void add_surface(const rendering::PlacedSurface& placed, Solid& out) {
-  const rendering::Surface& surface = *placed.surface;
-  for (const rendering::SurfaceTriangle& t : surface.triangles()) {
+  const stimuli::Surface& surface = *placed.surface;
+  for (const stimuli::SurfaceTriangle& t : surface.triangles()) {
     if (t.is_back()) continue;
     ReferenceTriangle triangle;
     for (std::size_t k = 0; k < 3; ++k)
@@ -294,10 +294,10 @@ class ByPeer final : public Shower {
   };
 
   void add(const rendering::PlacedSurface& placed, const PeerLibrary& library) {
-    const rendering::Surface& surface = *placed.surface;
+    const stimuli::Surface& surface = *placed.surface;
     PeerMesh mesh;
     mesh.vertices.assign(surface.vertices().begin(), surface.vertices().end());
-    for (const rendering::SurfaceTriangle& t : surface.triangles()) {
+    for (const stimuli::SurfaceTriangle& t : surface.triangles()) {
       if (!t.is_back()) mesh.triangles.push_back(t.corners);
     }
     mesh.centre = surface.centre();

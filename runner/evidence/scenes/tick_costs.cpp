@@ -427,10 +427,10 @@ Bench bumpy_ball(int subdivisions) {
     v *= 1 + 0.1 * sum / static_cast<double>(waves.size());
     radius = std::max(radius, glm::length(v));
   }
-  std::vector<rendering::SurfaceShell> shells = {
+  std::vector<stimuli::SurfaceShell> shells = {
       {std::make_shared<const stimuli::ClosedSurface>(stimuli::closed_surface(soup).surface),
        Pose{}, stimuli::Material{}}};
-  const auto surface = std::make_shared<const rendering::Surface>(shells);
+  const auto surface = std::make_shared<const stimuli::Surface>(shells);
   return {"bumpy ball, concave",
           soup.faces.size(),
           rendering::Scene({}, true, {}, nullptr, {{surface, Pose{}, 0}}),

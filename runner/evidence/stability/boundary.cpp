@@ -110,10 +110,10 @@ rendering::SceneSurface valley(const stimuli::Material& material) {
   }
   stimuli::Material plain = material;
   plain.layers.clear();
-  const std::vector<rendering::SurfaceShell> shells = {
+  const std::vector<stimuli::SurfaceShell> shells = {
       {std::make_shared<const stimuli::ClosedSurface>(stimuli::closed_surface(soup).surface),
        Pose{}, plain}};
-  return {std::make_shared<const rendering::Surface>(shells), Pose{}, 0, {}};
+  return {std::make_shared<const stimuli::Surface>(shells), Pose{}, 0, {}};
 }
 
 /// Adds the layers of materials as further objects.

@@ -316,13 +316,13 @@ void add_structures(const rendering::Scene& scene, const rendering::Renderer& re
       tally(
           scene, [](const rendering::ContactTrees& t) { return t.support_map() != nullptr; },
           vertices),
-      "vertices to climb", rendering::SupportMap::kSmallMesh));
+      "vertices to climb", stimuli::SupportMap::kSmallMesh));
   stages.push_back(structure(
       "facet map",
       tally(
           scene, [](const rendering::ContactTrees& t) { return t.facet_map() != nullptr; },
           vertices),
-      "vertices to walk past", rendering::SupportMap::kSmallMesh));
+      "vertices to walk past", stimuli::SupportMap::kSmallMesh));
 }
 
 /// Parts that a point anywhere on the first part's bounding sphere cannot reach.

@@ -14,8 +14,8 @@ namespace {
 
 BodyInertia brick(double mass = 0.3) {
   const Mesh mesh = box_mesh({0.1, 0.2, 0.03});
-  const PlacedMesh part{mesh.get(), {}};
-  return inertia_of(with_mass(moments_of_union({&part, 1}), mass));
+  const stimuli::PlacedMesh part{mesh.get(), {}};
+  return inertia_of(stimuli::with_mass(stimuli::moments_of_union({&part, 1}), mass));
 }
 
 TEST(FreeMotion, TumblingKeepsMomentumToTheBitAndEnergy) {
@@ -41,8 +41,9 @@ TEST(FreeMotion, TumblingKeepsMomentumToTheBitAndEnergy) {
 /// the spin rate, for a thin coin and a small angle.
 TEST(FreeMotion, CoinPrecessesAtMomentumByMomentAcross) {
   const Mesh coin = mesh_of(stimuli::cylinder(0.012, 0.002, 64));
-  const PlacedMesh part{coin.get(), {}};
-  const BodyInertia inertia = inertia_of(with_mass(moments_of_union({&part, 1}), 0.0075));
+  const stimuli::PlacedMesh part{coin.get(), {}};
+  const BodyInertia inertia =
+      inertia_of(stimuli::with_mass(stimuli::moments_of_union({&part, 1}), 0.0075));
   BodyMotion m;
   m.spin_momentum = spin_momentum_of(inertia, m.orientation, {2, 0, 30});
   const Vec3 along = glm::normalize(m.spin_momentum);

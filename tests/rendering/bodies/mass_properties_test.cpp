@@ -1,3 +1,5 @@
+#include "stimuli/surfaces/mass_properties.h"
+
 #include <gtest/gtest.h>
 
 #include <array>
@@ -10,7 +12,6 @@
 #include <vector>
 
 #include "data/base/random.h"
-#include "rendering/bodies/rigid_motion.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/convex_mesh.h"
 #include "stimuli/orientation.h"
@@ -21,9 +22,9 @@
 namespace palpate::rendering::test {
 namespace {
 
-MassProperties whole(const Mesh& mesh, const Pose& pose = {}, double density = 1000) {
-  const PlacedMesh part{mesh.get(), pose};
-  return with_density(moments_of_union({&part, 1}), density);
+stimuli::MassProperties whole(const Mesh& mesh, const Pose& pose = {}, double density = 1000) {
+  const stimuli::PlacedMesh part{mesh.get(), pose};
+  return stimuli::with_density(stimuli::moments_of_union({&part, 1}), density);
 }
 
 void expect_matrix(const Mat3& found, const Mat3& expected, double tolerance) {
@@ -34,7 +35,7 @@ void expect_matrix(const Mat3& found, const Mat3& expected, double tolerance) {
 
 TEST(MassProperties, BoxIsAsInTheTextbook) {
   const Vec3 size(0.1, 0.2, 0.05);
-  const MassProperties p = whole(box_mesh(size));
+  const stimuli::MassProperties p = whole(box_mesh(size));
   const double mass = 1000 * 0.1 * 0.2 * 0.05;
   EXPECT_NEAR(p.mass, mass, 1e-14);
   EXPECT_NEAR(glm::length(p.centre), 0, 1e-16);
@@ -48,7 +49,7 @@ TEST(MassProperties, SphereErrorFallsWithSquareOfTheEdge) {
   const double volume = 4.0 / 3 * std::numbers::pi * r * r * r;
   double last = 0;
   for (int n = 2; n < 5; ++n) {
-    const MassProperties p = whole(mesh_of(stimuli::icosphere(r, n)));
+    const stimuli::MassProperties p = whole(mesh_of(stimuli::icosphere(r, n)));
     const double error = 1 - p.mass / (1000 * volume);
     EXPECT_GT(error, 0);  // inscribed
     EXPECT_NEAR(p.inertia[0][0] / (0.4 * p.mass * r * r), 1, 2.2 * error);
@@ -63,7 +64,7 @@ TEST(MassProperties, SphereErrorFallsWithSquareOfTheEdge) {
 TEST(MassProperties, AreTheSameFarAwayAndTurned) {
   const Mesh mesh = box_mesh({0.1, 0.2, 0.05});
   const Quat q = glm::normalize(Quat(0.3, 0.4, -0.5, 0.7));
-  const MassProperties here = whole(mesh), there = whole(mesh, {{300, -200, 100}, q});
+  const stimuli::MassProperties here = whole(mesh), there = whole(mesh, {{300, -200, 100}, q});
   EXPECT_NEAR(there.mass, here.mass, 1e-12 * here.mass);
   EXPECT_NEAR(glm::distance(there.centre, Vec3(300, -200, 100)), 0, 1e-12);
   const Mat3 axes = glm::mat3_cast(q);
@@ -74,23 +75,24 @@ TEST(MassProperties, AreTheSameFarAwayAndTurned) {
 /// A cube cut into parts, overlapping itself or covered by itself has the cube's properties.
 TEST(MassProperties, RegionsOfSeveralPartsCountOnce) {
   const Mesh cube = box_mesh(Vec3(0.1)), slab = box_mesh({0.06, 0.1, 0.1});
-  const MassProperties expected = whole(cube);
-  const std::vector<std::vector<PlacedMesh>> covers = {
+  const stimuli::MassProperties expected = whole(cube);
+  const std::vector<std::vector<stimuli::PlacedMesh>> covers = {
       {{cube.get(), {}}, {cube.get(), {}}},
       {{slab.get(), {{-0.02, 0, 0}, {1, 0, 0, 0}}}, {slab.get(), {{0.02, 0, 0}, {1, 0, 0, 0}}}},
   };
   for (std::size_t i = 0; i < covers.size(); ++i) {
-    const MassProperties p = with_density(moments_of_union(covers[i]), 1000);
+    const stimuli::MassProperties p =
+        stimuli::with_density(stimuli::moments_of_union(covers[i]), 1000);
     EXPECT_NEAR(p.mass, expected.mass, 1e-13) << i;
     EXPECT_NEAR(glm::length(p.centre), 0, 1e-14) << i;
     expect_matrix(p.inertia, expected.inertia, 1e-15);
   }
   const Mesh half = box_mesh({0.05, 0.1, 0.1}), inner = box_mesh(Vec3(0.03));
-  const std::vector<PlacedMesh> abut = {
+  const std::vector<stimuli::PlacedMesh> abut = {
       {half.get(), {{-0.025, 0, 0}, {1, 0, 0, 0}}},
       {half.get(), {{0.025, 0, 0}, {1, 0, 0, 0}}},
       {inner.get(), {{0.01, 0.005, 0}, glm::normalize(Quat(1, 0.2, 0.3, 0.1))}}};
-  const MassProperties p = with_density(moments_of_union(abut), 1000);
+  const stimuli::MassProperties p = stimuli::with_density(stimuli::moments_of_union(abut), 1000);
   EXPECT_NEAR(p.mass, expected.mass, 1e-13);
   expect_matrix(p.inertia, expected.inertia, 1e-15);
 }
@@ -100,8 +102,8 @@ TEST(MassProperties, UnionOfTurnedBoxesAgreesWithCounting) {
   const Vec3 size_a(0.1, 0.04, 0.06), size_b(0.05, 0.09, 0.03);
   const Mesh a = box_mesh(size_a), b = box_mesh(size_b);
   const Pose pose_b{{0.02, 0.015, 0.01}, glm::normalize(Quat(1, 0.3, -0.2, 0.4))};
-  const std::vector<PlacedMesh> parts = {{a.get(), {}}, {b.get(), pose_b}};
-  const VolumeMoments m = moments_of_union(parts);
+  const std::vector<stimuli::PlacedMesh> parts = {{a.get(), {}}, {b.get(), pose_b}};
+  const stimuli::VolumeMoments m = stimuli::moments_of_union(parts);
   const auto inside = [](const Vec3& p, const Vec3& size) {
     return std::abs(p.x) < size.x / 2 && std::abs(p.y) < size.y / 2 && std::abs(p.z) < size.z / 2;
   };
@@ -126,23 +128,23 @@ TEST(MassProperties, UnionOfTurnedBoxesAgreesWithCounting) {
 /// The parallel axis theorem, with two cubes that form a box.
 TEST(MassProperties, MassIsSpreadOverAllParts) {
   const Mesh cube = box_mesh(Vec3(0.1));
-  const std::vector<PlacedMesh> parts = {{cube.get(), {{0.35, 0, 0}, {1, 0, 0, 0}}},
-                                         {cube.get(), {{0.05, 0, 0}, {1, 0, 0, 0}}}};
-  const MassProperties p = with_mass(moments_of_union(parts), 3);
+  const std::vector<stimuli::PlacedMesh> parts = {{cube.get(), {{0.35, 0, 0}, {1, 0, 0, 0}}},
+                                                  {cube.get(), {{0.05, 0, 0}, {1, 0, 0, 0}}}};
+  const stimuli::MassProperties p = stimuli::with_mass(stimuli::moments_of_union(parts), 3);
   EXPECT_NEAR(p.mass, 3, 1e-14);
   EXPECT_NEAR(p.centre.x, 0.2, 1e-15);
   EXPECT_NEAR(p.inertia[0][0], 3 * 0.01 / 6, 1e-14);
   EXPECT_NEAR(p.inertia[1][1], 3 * 0.01 / 6 + 3 * 0.15 * 0.15, 1e-14);
 }
 
-Surface surface_of(const std::vector<std::pair<stimuli::PolygonSoup, Pose>>& soups) {
-  std::vector<SurfaceShell> shells;
+stimuli::Surface surface_of(const std::vector<std::pair<stimuli::PolygonSoup, Pose>>& soups) {
+  std::vector<stimuli::SurfaceShell> shells;
   for (const auto& [soup, pose] : soups)
     shells.push_back(
         {std::make_shared<const stimuli::ClosedSurface>(stimuli::closed_surface(soup).surface),
          pose,
          {}});
-  return Surface(shells);
+  return stimuli::Surface(shells);
 }
 
 /// A closed surface has the properties of the convex parts that it bounds; overlapping shells count
@@ -153,12 +155,13 @@ TEST(MassProperties, ClosedSurfaceMatchesTheUnionOfItsParts) {
   const Pose beside{{0.5, 0, 0}, {1, 0, 0, 0}}, over{{0.02, 0.015, 0.01}, far.orientation};
   const Mesh a = box_mesh(size_a), b = box_mesh(size_b);
   for (const Pose& pose_b : {beside, over}) {
-    const std::vector<PlacedMesh> parts = {{a.get(), stimuli::compose(far, {})},
-                                           {b.get(), stimuli::compose(far, pose_b)}};
-    const MassProperties expected = with_density(moments_of_union(parts), 1000);
-    const MassProperties found = with_density(
-        moments_of_surface(surface_of({{stimuli::box(size_a), {}}, {stimuli::box(size_b), pose_b}}),
-                           far),
+    const std::vector<stimuli::PlacedMesh> parts = {{a.get(), stimuli::compose(far, {})},
+                                                    {b.get(), stimuli::compose(far, pose_b)}};
+    const stimuli::MassProperties expected =
+        stimuli::with_density(stimuli::moments_of_union(parts), 1000);
+    const stimuli::MassProperties found = stimuli::with_density(
+        stimuli::moments_of_surface(
+            surface_of({{stimuli::box(size_a), {}}, {stimuli::box(size_b), pose_b}}), far),
         1000);
     const double slack = pose_b.position == beside.position ? 1e-11 : 3e-4;
     EXPECT_NEAR(found.mass / expected.mass, 1, slack);
@@ -191,11 +194,12 @@ TEST(MassProperties, RoundedFilesPartsMatchItsSurface) {
       round_off(part);
       parts.emplace_back(part);
     }
-    std::vector<PlacedMesh> placed;
+    std::vector<stimuli::PlacedMesh> placed;
     for (const stimuli::ConvexMesh& part : parts) placed.push_back({&part, {}});
-    const MassProperties expected =
-        with_density(moments_of_surface(surface_of({{soup, {}}}), {}), 1000);
-    const MassProperties found = with_density(moments_of_union(placed), 1000);
+    const stimuli::MassProperties expected =
+        stimuli::with_density(stimuli::moments_of_surface(surface_of({{soup, {}}}), {}), 1000);
+    const stimuli::MassProperties found =
+        stimuli::with_density(stimuli::moments_of_union(placed), 1000);
     const double slack = 1e3 * grain;  // of the size: some hundred times that of the grain
     EXPECT_NEAR(found.mass / expected.mass, 1, slack) << round;
     EXPECT_LT(glm::distance(found.centre, expected.centre), 0.1 * slack) << round;

@@ -10,9 +10,9 @@
 #include <limits>
 #include <stdexcept>
 
-#include "rendering/surface.h"
 #include "stimuli/closed_surface.h"
 #include "stimuli/polygon_soup.h"
+#include "stimuli/surfaces/surface.h"
 #include "tests/rendering/bodies/body_fixtures.h"
 
 namespace palpate::rendering::test {
@@ -238,10 +238,10 @@ Angle angle_of(const Quat& turn, bool rounded, int object = 0) {
   Angle out;
   stimuli::Material material;
   material.stiffness = 1000;
-  const std::vector<SurfaceShell> shells = {
+  const std::vector<stimuli::SurfaceShell> shells = {
       {std::make_shared<const stimuli::ClosedSurface>(stimuli::closed_surface(soup).surface),
        Pose{}, material}};
-  out.surface = {std::make_shared<const Surface>(shells), Pose{}, object};
+  out.surface = {std::make_shared<const stimuli::Surface>(shells), Pose{}, object};
   for (const auto& [size, middle] : {std::pair(Vec3(0.06, 0.02, 0.04), Vec3(0, -0.02, 0)),
                                      std::pair(Vec3(0.02, 0.04, 0.04), Vec3(-0.02, 0.01, 0))}) {
     SceneObject part;
@@ -325,7 +325,7 @@ TEST(MovingScene, IdealTipStaysOutOfRoundedConcaveBody) {
     const Angle angle = angle_of(turn, true);
     const std::vector<MovingObject> moving = {
         heavy(100, {1.5 - 0.2 * seed, 0.4 * seed - 2, 1 + 0.1 * seed})};
-    const Surface& surface = *angle.surface.surface;
+    const stimuli::Surface& surface = *angle.surface.surface;
     for (const Renderer* renderer : {&point_renderer(), &ray_renderer()}) {
       const Scene scene = moving_scene({}, moving, Vec3(0), true, {}, true, {angle.surface});
       const Vec3 centre = body_world_of(scene).bodies[0].placed.position;

@@ -20,13 +20,13 @@ namespace {
 
 using palpate::testing::random_direction;
 
-std::shared_ptr<const Surface> surface_of(const stimuli::PolygonSoup& soup) {
+std::shared_ptr<const stimuli::Surface> surface_of(const stimuli::PolygonSoup& soup) {
   stimuli::Material material;
   material.stiffness = 1000;
-  const std::vector<SurfaceShell> shells = {
+  const std::vector<stimuli::SurfaceShell> shells = {
       {std::make_shared<const stimuli::ClosedSurface>(stimuli::closed_surface(soup).surface),
        Pose{}, material, 0}};
-  return std::make_shared<const Surface>(shells);
+  return std::make_shared<const stimuli::Surface>(shells);
 }
 
 /// Collects objects one by one, then builds a scene.
@@ -64,7 +64,7 @@ double deepest_overlap(const Scene& scene, const RenderState& state) {
     const BodyMotion& a = now.motion[pair.a];
     const Pose b =
         pair.obstacle ? Pose{} : Pose{now.motion[pair.b].centre, now.motion[pair.b].orientation};
-    const CollisionSurface& other =
+    const stimuli::CollisionSurface& other =
         pair.obstacle ? *world.obstacles[pair.b].surface : *world.bodies[pair.b].surface;
     deepest = std::max(
         deepest, overlap_of(place_of(*world.bodies[pair.a].surface, {a.centre, a.orientation}),

@@ -25,7 +25,7 @@ namespace {
 using testing::random_direction;
 using testing::uniform;
 
-CollisionSurface surface_of(const stimuli::PolygonSoup& soup) {
+stimuli::CollisionSurface surface_of(const stimuli::PolygonSoup& soup) {
   const stimuli::ClosedSurface closed = stimuli::closed_surface(soup).surface;
   return {closed.vertices, closed.triangles};
 }
@@ -54,7 +54,7 @@ stimuli::PolygonSoup any_shape(Random& random) {
   }
 }
 
-SurfacePlace at(const CollisionSurface& surface, const Vec3& position,
+SurfacePlace at(const stimuli::CollisionSurface& surface, const Vec3& position,
                 const Quat& orientation = Quat(1, 0, 0, 0)) {
   return {&surface, glm::mat3_cast(orientation), position};
 }
@@ -83,7 +83,7 @@ double between_segments(const Vec3& p, const Vec3& u, const Vec3& q, const Vec3&
 
 std::vector<std::array<Vec3, 3>> triangles_of(const SurfacePlace& place) {
   std::vector<std::array<Vec3, 3>> out;
-  for (const CollisionSurface::Face& face : place.surface->faces()) {
+  for (const stimuli::CollisionSurface::Face& face : place.surface->faces()) {
     std::array<Vec3, 3> corners;
     for (std::size_t k = 0; k < 3; ++k)
       corners[k] = place.axes * place.surface->vertices()[face.corners[k]] + place.position;
@@ -117,7 +117,8 @@ TEST(SurfaceGap, EqualsEveryPairOfTriangles) {
   for (const std::uint64_t seed : {1, 2, 3}) {
     Random random(seed);
     for (int i = 0; i < 60; ++i) {
-      const CollisionSurface a = surface_of(any_shape(random)), b = surface_of(any_shape(random));
+      const stimuli::CollisionSurface a = surface_of(any_shape(random)),
+                                      b = surface_of(any_shape(random));
       const SurfacePlace at_a = at(a, uniform(random, 0, 0.06) * random_direction(random),
                                    stimuli::uniform_rotation(random));
       const SurfacePlace at_b = at(b, Vec3(0), stimuli::uniform_rotation(random));
@@ -133,7 +134,7 @@ TEST(SurfaceGap, EqualsEveryPairOfTriangles) {
 
 TEST(SurfaceGap, ShortReachFindsNoMore) {
   Random random(4);
-  const CollisionSurface a = surface_of(lump(random, 2)), b = surface_of(lump(random, 2));
+  const stimuli::CollisionSurface a = surface_of(lump(random, 2)), b = surface_of(lump(random, 2));
   const SurfacePlace at_a = at(a, Vec3(0)), at_b = at(b, Vec3(0.06, 0, 0));
   const double gap = gap_between(at_a, at_b, {1});
   EXPECT_GT(gap, 2e-3);
@@ -142,8 +143,8 @@ TEST(SurfaceGap, ShortReachFindsNoMore) {
 }
 
 TEST(SurfaceGap, BoxLiesOnItsFourCorners) {
-  const CollisionSurface floor = surface_of(stimuli::box(Vec3(0.5, 0.5, 0.02))),
-                         box = surface_of(stimuli::box(Vec3(0.03, 0.05, 0.01)));
+  const stimuli::CollisionSurface floor = surface_of(stimuli::box(Vec3(0.5, 0.5, 0.02))),
+                                  box = surface_of(stimuli::box(Vec3(0.03, 0.05, 0.01)));
   NearPlaces places;
   places.make_room();
   for (const double gap : {5e-9, 0.0, -5e-9, 1e-6, -1e-5}) {
@@ -182,9 +183,9 @@ TEST(SurfaceGap, InnerEdgesOfAPlateAreNone) {
                                std::pair{index(kCells, i), index(kCells, i + 1)}})
       plate.faces.push_back({a, b, half + b, half + a});
   }
-  const CollisionSurface flat = surface_of(plate);
+  const stimuli::CollisionSurface flat = surface_of(plate);
   Random random(5);
-  const CollisionSurface box = surface_of(stimuli::box(Vec3(0.01, 0.01, 0.01)));
+  const stimuli::CollisionSurface box = surface_of(stimuli::box(Vec3(0.01, 0.01, 0.01)));
   NearPlaces places;
   places.make_room();
   for (int i = 0; i < 200; ++i) {
@@ -202,12 +203,12 @@ TEST(SurfaceGap, InnerEdgesOfAPlateAreNone) {
 
 TEST(SurfaceGap, OverlapHasItsDepth) {
   Random random(6);
-  const CollisionSurface box = surface_of(stimuli::box(Vec3(0.03, 0.05, 0.01)));
-  const CollisionSurface stairs = surface_of(stimuli::solids::l_shape().soup);
+  const stimuli::CollisionSurface box = surface_of(stimuli::box(Vec3(0.03, 0.05, 0.01)));
+  const stimuli::CollisionSurface stairs = surface_of(stimuli::solids::l_shape().soup);
   EXPECT_NEAR(overlap_of(at(box, Vec3(0)), at(box, Vec3(0.029, 0, 0))), 1e-3, 1e-9);
   EXPECT_GT(overlap_of(at(box, Vec3(0)), at(box, Vec3(0.01, 0.01, 0))), 4e-3);
   EXPECT_EQ(overlap_of(at(box, Vec3(0)), at(box, Vec3(0.0301, 0, 0))), 0);
-  for (const CollisionSurface* one : {&box, &stairs})
+  for (const stimuli::CollisionSurface* one : {&box, &stairs})
     EXPECT_GT(overlap_of(at(*one, Vec3(0)), at(*one, Vec3(0))), 4e-3) << "at one place";
   // Crossed bars: no corner of one is in the other.
   EXPECT_GT(overlap_of(at(box, Vec3(0)), at(box, Vec3(0), glm::angleAxis(1.57, Vec3(0, 0, 1)))),

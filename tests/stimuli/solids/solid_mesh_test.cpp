@@ -16,18 +16,18 @@ namespace palpate::stimuli {
 namespace {
 
 /// Volume by the divergence theorem over the surface's triangles.
-double volume_inside(const SolidMesh& mesh, const std::vector<SurfaceTriangle>& surface) {
+double volume_inside(const SolidMesh& mesh, const std::vector<SolidFace>& surface) {
   double volume = 0;
-  for (const SurfaceTriangle& t : surface) {
+  for (const SolidFace& t : surface) {
     volume += glm::dot(mesh.nodes[t[0]], glm::cross(mesh.nodes[t[1]], mesh.nodes[t[2]])) / 6;
   }
   return volume;
 }
 
 /// Every side occurs once in each direction, so there is no hole and no reversed face.
-void expect_closed(const std::vector<SurfaceTriangle>& surface) {
+void expect_closed(const std::vector<SolidFace>& surface) {
   std::set<std::pair<std::uint32_t, std::uint32_t>> sides;
-  for (const SurfaceTriangle& t : surface) {
+  for (const SolidFace& t : surface) {
     for (std::size_t k = 0; k < 3; ++k)
       EXPECT_TRUE(sides.emplace(t[k], t[(k + 1) % 3]).second) << "twice: " << t[k];
   }
@@ -84,7 +84,7 @@ TEST(SolidMesh, FillsItsShapeClosedAtEveryResolution) {
     for (const int resolution : {kLeastResolution, 5, 10, kMostResolution}) {
       SCOPED_TRACE(static_cast<int>(c.shape) * 100 + resolution);
       const SolidMesh mesh = mesh_of_primitive(solid_spec(c.shape), resolution);
-      const std::vector<SurfaceTriangle> surface = surface_of(mesh);
+      const std::vector<SolidFace> surface = surface_of(mesh);
       expect_closed(surface);
       expect_upright(mesh);
       const double share = volume_inside(mesh, surface) / c.volume;
@@ -127,11 +127,11 @@ TEST(SolidMesh, TetrahedronIsClosedWithFourTrianglesAFace) {
   mesh.nodes = {{0, 0, 0}, {2, 0, 0}, {0, 2, 0}, {0, 0, 2}, {1, 0, 0},
                 {1, 1, 0}, {0, 1, 0}, {0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
   mesh.tetrahedra = {{0, 1, 2, 3, 4, 5, 6, 7, 8, 9}};
-  const std::vector<SurfaceTriangle> surface = surface_of(mesh);
+  const std::vector<SolidFace> surface = surface_of(mesh);
   ASSERT_EQ(surface.size(), 16U);
   expect_closed(surface);
   EXPECT_NEAR(volume_inside(mesh, surface), 8.0 / 6, 1e-15);
-  for (const SurfaceTriangle& t : surface) {
+  for (const SolidFace& t : surface) {
     const Vec3 area =
         glm::cross(mesh.nodes[t[1]] - mesh.nodes[t[0]], mesh.nodes[t[2]] - mesh.nodes[t[0]]);
     EXPECT_GT(glm::length(area), 0.9) << "no triangle on two nodes";

@@ -123,10 +123,10 @@ stimuli::PolygonSoup bumpy_ball() {
 
 TEST(SurfaceReference, AgreesWithTheLawOnAConcaveMesh) {
   const stimuli::PolygonSoup soup = bumpy_ball();
-  const std::vector<rendering::SurfaceShell> shells = {
+  const std::vector<stimuli::SurfaceShell> shells = {
       {std::make_shared<const stimuli::ClosedSurface>(stimuli::closed_surface(soup).surface),
        Pose{}, stimuli::Material{}}};
-  const auto surface = std::make_shared<const rendering::Surface>(shells);
+  const auto surface = std::make_shared<const stimuli::Surface>(shells);
   for (const bool side : {false, true}) {
     const rendering::Renderer& renderer =
         side ? rendering::ray_renderer() : rendering::point_renderer();

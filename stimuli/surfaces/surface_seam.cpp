@@ -7,9 +7,9 @@
 #include <glm/geometric.hpp>
 #include <vector>
 
-#include "rendering/surface.h"
+#include "stimuli/surfaces/surface.h"
 
-namespace palpate::rendering {
+namespace palpate::stimuli {
 namespace {
 
 // Of the coordinates' error. Rounding moves each of two planes by up to its root of three times.
@@ -46,7 +46,7 @@ double gap(const Corners& under, const Vec3& normal, const Corners& over, double
 }
 
 /// For each triangle the first one of those that are connected with it.
-std::vector<std::uint32_t> pieces_of(const stimuli::LargeArray<SurfaceTriangle>& triangles) {
+std::vector<std::uint32_t> pieces_of(const LargeArray<SurfaceTriangle>& triangles) {
   constexpr std::uint32_t kNone = ~0U;
   std::vector<std::uint32_t> piece(triangles.size(), kNone), todo;
   for (std::uint32_t first = 0; first < piece.size(); ++first) {
@@ -121,4 +121,4 @@ double Surface::widest_seam() const {
   return widest;
 }
 
-}  // namespace palpate::rendering
+}  // namespace palpate::stimuli

@@ -1,4 +1,4 @@
-#include "rendering/surface.h"
+#include "stimuli/surfaces/surface.h"
 
 #include <algorithm>
 #include <cmath>
@@ -8,9 +8,9 @@
 #include <numeric>
 #include <utility>
 
-#include "rendering/surface_search.h"
+#include "stimuli/surfaces/surface_search.h"
 
-namespace palpate::rendering {
+namespace palpate::stimuli {
 namespace {
 
 /// Six times the signed volume below d's plane, in doubles, and a bound of its rounding error
@@ -50,8 +50,8 @@ float rounded_up(double value) {
 
 /// The normal for a triangle without area: that of the neighbour over its longest side, along which
 /// it lies. If that one has no area either, its neighbours are asked in the same way.
-Vec3 normal_of_neighbours(std::uint32_t index, const stimuli::LargeArray<Vec3>& vertices,
-                          const stimuli::LargeArray<SurfaceTriangle>& triangles) {
+Vec3 normal_of_neighbours(std::uint32_t index, const LargeArray<Vec3>& vertices,
+                          const LargeArray<SurfaceTriangle>& triangles) {
   constexpr int kMostSteps = 1000;
   std::uint32_t entered = 3;  // side; not taken back: two such triangles may lie along each other
   for (int step = 0; step < kMostSteps; ++step) {
@@ -118,7 +118,7 @@ void sort_for_nodes(std::span<const Vec3> middles, std::span<std::uint32_t> tria
 
 /// Moves each element to its place, without a copy of the array.
 template <class T>
-void move_to(stimuli::LargeArray<T>& all, std::span<const std::uint32_t> place) {
+void move_to(LargeArray<T>& all, std::span<const std::uint32_t> place) {
   std::vector<bool> there(all.size(), false);
   for (std::uint32_t i = 0; i < all.size(); ++i) {
     for (std::uint32_t to = place[i]; !there[i]; to = place[to]) {
@@ -218,7 +218,7 @@ void Surface::share_planes(std::span<const std::uint32_t> face, std::uint32_t fi
   std::vector<Plane> planes;
   const auto for_each = [&](const auto& visit) {
     for (std::size_t i = 0; i < face.size(); ++i) {
-      if (face[i] == stimuli::kNoFlatFace) continue;
+      if (face[i] == kNoFlatFace) continue;
       if (face[i] >= planes.size()) planes.resize(face[i] + 1);
       visit(planes[face[i]], triangles_[first + i]);
     }
@@ -466,4 +466,4 @@ int Surface::winding(const Vec3& point) const {
   return count;
 }
 
-}  // namespace palpate::rendering
+}  // namespace palpate::stimuli

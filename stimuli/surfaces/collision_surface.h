@@ -9,11 +9,11 @@
 #include <span>
 #include <vector>
 
-#include "rendering/surface.h"
 #include "stimuli/shapes.h"
+#include "stimuli/surfaces/surface.h"
 #include "stimuli/vec.h"
 
-namespace palpate::rendering {
+namespace palpate::stimuli {
 
 /// Unit directions within an angle of an axis.
 struct DirectionCone {
@@ -161,4 +161,4 @@ void CollisionSurface::crossings(const Vec3& start, const Vec3& along, const Vis
   }
 }
 
-}  // namespace palpate::rendering
+}  // namespace palpate::stimuli

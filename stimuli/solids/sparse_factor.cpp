@@ -1,10 +1,10 @@
-#include "rendering/bodies/soft/sparse_factor.h"
+#include "stimuli/solids/sparse_factor.h"
 
 #include <Eigen/SparseCholesky>
 #include <algorithm>
 #include <stdexcept>
 
-namespace palpate::rendering {
+namespace palpate::stimuli {
 
 Factor::Factor(std::size_t size, const std::vector<MatrixEntry>& entries) {
   using Matrix = Eigen::SparseMatrix<double>;
@@ -138,4 +138,4 @@ void Factor::solve_several(std::span<double> b, std::span<double> work) const {
   solve_sides<kTogether>(b.data(), work.data());
 }
 
-}  // namespace palpate::rendering
+}  // namespace palpate::stimuli

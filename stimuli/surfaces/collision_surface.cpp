@@ -1,4 +1,4 @@
-#include "rendering/bodies/collision_surface.h"
+#include "stimuli/surfaces/collision_surface.h"
 
 #include <algorithm>
 #include <glm/common.hpp>
@@ -10,7 +10,7 @@
 
 #include "stimuli/nearest_on_triangle.h"
 
-namespace palpate::rendering {
+namespace palpate::stimuli {
 namespace {
 
 constexpr double kFlat = 1e-9;          // rad; a smaller bend is rounding
@@ -377,7 +377,7 @@ double CollisionSurface::distance(const Vec3& point) const {
     for (std::uint32_t k = node.first; k < node.first + node.count; ++k) {
       const auto& corners = faces_[face_tree_.feature(k)].corners;
       const Vec3 away =
-          point - stimuli::nearest_on_triangle(
+          point - nearest_on_triangle(
                       {vertices_[corners[0]], vertices_[corners[1]], vertices_[corners[2]]}, point);
       least2 = std::min(least2, glm::dot(away, away));
     }
@@ -404,4 +404,4 @@ bool CollisionSurface::contains(const Vec3& point) const {
   return votes >= 2;
 }
 
-}  // namespace palpate::rendering
+}  // namespace palpate::stimuli

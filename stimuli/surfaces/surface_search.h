@@ -11,13 +11,13 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 
-#include "rendering/surface.h"
+#include "stimuli/surfaces/surface.h"
 
 #if defined(__AVX__)
 #include <immintrin.h>
 #endif
 
-namespace palpate::rendering {
+namespace palpate::stimuli {
 
 /// Tests all boxes of a node at once, in single precision with slack for its rounding: a box that
 /// is near is never missed.
@@ -289,4 +289,4 @@ void Surface::touchable(const SegmentMotion& motion, const Visit& visit) const {
   }
 }
 
-}  // namespace palpate::rendering
+}  // namespace palpate::stimuli

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-namespace palpate::rendering {
+namespace palpate::stimuli {
 
 /// An entry of a sparse matrix; several at one place are added up.
 struct MatrixEntry {
@@ -49,4 +49,4 @@ class Factor {
   std::size_t entries_ = 0;
 };
 
-}  // namespace palpate::rendering
+}  // namespace palpate::stimuli

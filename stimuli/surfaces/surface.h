@@ -13,7 +13,7 @@
 #include "stimuli/shapes.h"
 #include "stimuli/vec.h"
 
-namespace palpate::rendering {
+namespace palpate::stimuli {
 
 /// One cache line.
 struct alignas(64) SurfaceTriangle {
@@ -43,9 +43,9 @@ struct alignas(64) SurfaceTriangle {
 
 /// A closed surface as it stands in an object.
 struct SurfaceShell {
-  std::shared_ptr<const stimuli::ClosedSurface> surface;
+  std::shared_ptr<const ClosedSurface> surface;
   Pose pose;  ///< in the object
-  stimuli::Material material;
+  Material material;
   double pose_error = 0;  ///< m, of its corners, as the pose's numbers are rounded
 };
 
@@ -69,10 +69,10 @@ class Surface {
  public:
   explicit Surface(std::span<const SurfaceShell> shells);
 
-  const stimuli::LargeArray<Vec3>& vertices() const { return vertices_; }
+  const LargeArray<Vec3>& vertices() const { return vertices_; }
   /// Near triangles are near in the array.
-  const stimuli::LargeArray<SurfaceTriangle>& triangles() const { return triangles_; }
-  const std::vector<stimuli::Material>& materials() const { return materials_; }
+  const LargeArray<SurfaceTriangle>& triangles() const { return triangles_; }
+  const std::vector<Material>& materials() const { return materials_; }
   Vec3 centre() const { return centre_; }    ///< of a sphere about it
   double radius() const { return radius_; }  ///< m, of that sphere
   double size() const { return 2 * radius_; }
@@ -127,16 +127,16 @@ class Surface {
   void set_box(std::span<const std::uint32_t> triangles, std::size_t child, Node& node) const;
   void set_normals(std::span<const std::uint32_t> triangles, std::size_t child, Node& node) const;
 
-  stimuli::LargeArray<Vec3> vertices_;
-  stimuli::LargeArray<SurfaceTriangle> triangles_;
-  std::vector<stimuli::Material> materials_;
+  LargeArray<Vec3> vertices_;
+  LargeArray<SurfaceTriangle> triangles_;
+  std::vector<Material> materials_;
   std::vector<std::uint32_t> file_order_;
   double coordinate_error_ = 0;  ///< m, of the worst shell
   double seam_ = 0;
-  stimuli::LargeArray<Node> nodes_;
+  LargeArray<Node> nodes_;
   std::uint32_t root_ = 0;
   Vec3 centre_;
   double radius_ = 0;
 };
 
-}  // namespace palpate::rendering
+}  // namespace palpate::stimuli

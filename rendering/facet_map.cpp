@@ -1,4 +1,4 @@
-#include "rendering/direction_maps.h"
+#include "rendering/facet_map.h"
 
 #include <algorithm>
 #include <array>
@@ -6,27 +6,9 @@
 #include <glm/geometric.hpp>
 
 #include "rendering/facet_walk.h"
-#include "rendering/separation.h"
 #include "stimuli/convex_mesh.h"
 
 namespace palpate::rendering {
-
-SupportMap::SupportMap(const stimuli::ConvexMesh& mesh, std::size_t small_mesh,
-                       double vertices_per_cell) {
-  if (mesh.vertices().size() <= small_mesh) return;
-  directions_ =
-      DirectionCells::about(static_cast<double>(mesh.vertices().size()) / vertices_per_cell);
-  cells_.resize(directions_.count());
-  std::uint32_t vertex = 0;
-  directions_.visit_middles([&](std::size_t cell, const Vec3& direction) {
-    vertex = support_vertex(mesh, direction, vertex);
-    cells_[cell] = vertex;
-  });
-}
-
-std::uint32_t SupportMap::near_support(const Vec3& direction) const {
-  return cells_[directions_.cell_of(direction)];
-}
 
 namespace {
 
@@ -121,7 +103,8 @@ FacetMap::FacetMap(const stimuli::ConvexMesh& mesh, std::size_t small_mesh,
   row1_ = {-b / (a * e), 1 / e, 0};
   row2_ = {(b * f / e - c) / (a * g), -f / (e * g), 1 / g};
 
-  directions_ = DirectionCells::about(static_cast<double>(mesh.facets().size()) / facets_per_cell);
+  directions_ =
+      stimuli::DirectionCells::about(static_cast<double>(mesh.facets().size()) / facets_per_cell);
   cells_.resize(directions_.count());
   std::uint32_t facet = 0;
   directions_.visit_middles([&](std::size_t cell, const Vec3& u) {
