@@ -39,6 +39,11 @@ def dot(a, b):
     return np.einsum("...i,...i->...", a, b)
 
 
+def unit(a):
+    length = np.linalg.norm(a, axis=1)
+    return a / np.where(length > 0, length, 1)[:, None]
+
+
 class Surface:
     """Triangles, and what follows of them by definition."""
 
@@ -47,8 +52,10 @@ class Surface:
         self.size = np.linalg.norm(np.ptp(v, axis=0))
         self.a, self.b, self.c = (v[f[:, k]] for k in range(3))
         n = np.cross(self.b - self.a, self.c - self.a)
+        self.low, self.high = (least(least(self.a, self.b), self.c) for least in (np.minimum, np.maximum))
         self.area = np.linalg.norm(n, axis=1)
         self.n = n / np.where(self.area > 0, self.area, 1)[:, None]
+        self.inward = [unit(np.cross(self.n, y - x)) for x, y in ((self.a, self.b), (self.b, self.c), (self.c, self.a))]
         self.edges()
 
     def edges(self):
@@ -84,17 +91,19 @@ class Surface:
                        / (2 * np.pi))
         return np.array(out)
 
-    def distances(self, p):
-        """Of a point from each triangle."""
-        h = dot(p - self.a, self.n)
-        best = np.full(len(self.f), np.inf)
-        over = np.ones(len(self.f), bool)
-        for x, y in ((self.a, self.b), (self.b, self.c), (self.c, self.a)):
+    def near(self, p, tolerance):
+        """The triangles that a point is closer to than the tolerance."""
+        some = np.flatnonzero(((p > self.low - tolerance) & (p < self.high + tolerance)).all(1))
+        a, b, c, n = (x[some] for x in (self.a, self.b, self.c, self.n))
+        h = dot(p - a, n)
+        best = np.full(len(some), np.inf)
+        over = np.ones(len(some), bool)
+        for x, y in ((a, b), (b, c), (c, a)):
             d = y - x
-            over &= dot(np.cross(d, p - x), self.n) >= 0
+            over &= dot(np.cross(d, p - x), n) >= 0
             t = np.clip(dot(p - x, d) / dot(d, d), 0, 1)
             best = np.minimum(best, np.linalg.norm(p - x - t[:, None] * d, axis=1))
-        return np.where(over, np.abs(h), best)
+        return some[np.where(over, np.abs(h), best) < tolerance]
 
     def crossings(self, p, q):
         """Where the segment from p to q passes through triangles, as parts of its length."""
@@ -146,8 +155,8 @@ class Judge:
         t.sort()
         middle = np.concatenate([t, (t[1:] + t[:-1]) / 2])
         points = p + middle[:, None] * (q - p)
-        points = points[self.s.winding(points) > .5]
-        return any(self.s.distances(x).min() > self.tolerance for x in points)
+        off = [x for x in points if not len(self.s.near(x, self.tolerance))]
+        return (self.s.winding(off) > .5).any()
 
     def generators(self, segments, reference):
         """(normal, place) of all patches that segments touch."""
@@ -165,7 +174,7 @@ class Judge:
             for n_touched, place in list(out):
                 along = np.flatnonzero(flat & (self.s.n @ n_touched > 0))
                 if len(along):
-                    near = along[self.s.distances(place)[along] < self.tolerance]
+                    near = np.intersect1d(along, self.s.near(place, self.tolerance))
                     out += [(n_touched, p + k * d) for k in self.portions(near, flat, p, q)]
         return out
 
@@ -185,8 +194,7 @@ class Judge:
         """Facets that an end touches: the end that points into the facet; both where the segment lies along it."""
         out = []
         for end, sign in ((p, 1),) if is_point else ((p, 1), (q, -1)):
-            near = self.s.distances(end) < self.tolerance
-            out += [(self.s.n[t], end) for t in np.flatnonzero(near & (sign * slope > -NEARLY_PARALLEL))]
+            out += [(self.s.n[t], end) for t in self.s.near(end, self.tolerance) if sign * slope[t] > -NEARLY_PARALLEL]
         return out
 
     def at_edges(self, p, d):
@@ -216,22 +224,14 @@ class Judge:
         """The ends of what lies over the triangles in t's plane."""
         s = self.s
         plane = np.flatnonzero((s.n @ s.n[t] > 1 - 1e-8) & (np.abs((s.a - s.a[t]) @ s.n[t]) < self.tolerance))
-        found = []
-        for i in plane:
-            low, high = 0., 1.
-            for x, y in ((s.a[i], s.b[i]), (s.b[i], s.c[i]), (s.c[i], s.a[i])):
-                inward = np.cross(s.n[i], y - x)
-                inward /= np.linalg.norm(inward)
-                hp, hq = (p - x) @ inward + self.tolerance, (q - x) @ inward + self.tolerance
-                if hp < 0 and hq < 0:
-                    high = -1
-                elif hp < 0:
-                    low = max(low, hp / (hp - hq))
-                elif hq < 0:
-                    high = min(high, hp / (hp - hq))
-            if low <= high:
-                found += [low, high]
-        return found
+        low, high = np.zeros(len(plane)), np.ones(len(plane))
+        for x, inward in zip((s.a, s.b, s.c), s.inward):
+            hp, hq = (dot(end - x[plane], inward[plane]) + self.tolerance for end in (p, q))
+            cut = hp / np.where(hp == hq, 1, hp - hq)
+            high[(hp < 0) & (hq < 0)] = -1
+            low = np.where((hp < 0) & (hq >= 0), np.maximum(low, cut), low)
+            high = np.where((hp >= 0) & (hq < 0), np.minimum(high, cut), high)
+        return np.stack([low, high], 1)[low <= high].ravel().tolist()
 
     def pushed(self, segments, tip, force, torque):
         """What is wrong with force and torque, or nothing."""
