@@ -186,7 +186,8 @@ void read_file(ObjectReader& reader, const MeshFiles& files, stimuli::ObjectSpec
   } else {
     try {
       stimuli::MeshFileBytes read = stimuli::mesh_file_bytes(path.string());
-      spec.file_bytes = std::make_shared<const std::string>(std::move(read.bytes));
+      if (files.kept)
+        spec.file_bytes = std::make_shared<const std::string>(std::move(read.bytes));
       spec.files_read = std::move(read.files);
     } catch (const stimuli::MeshError& unreadable) {
       reader.faults().add(reader.pointer("file"), unreadable.what());
@@ -426,11 +427,13 @@ SceneSpec parse_scene_text(const std::string& text, const std::string& path) {
   const nlohmann::json root = read_json(text, faults);
   ObjectReader reader(root, "", faults);
   reader.member("$schema");
+  MeshFiles files{folder_of(path)};
+  files.kept = false;
   SceneSpec scene;
   if (const auto* const list = reader.array("objects", 1, kMaxObjects, Presence::required)) {
     for (std::size_t i = 0; i < list->size(); ++i) {
       ObjectReader object((*list)[i], child_pointer("/objects", i), faults);
-      scene.objects.push_back(read_object(object, stimuli::Material{}, {folder_of(path)}));
+      scene.objects.push_back(read_object(object, stimuli::Material{}, files));
       object.refuse_unknown_keys();
     }
   }

@@ -16,6 +16,7 @@ struct MeshFiles {
   std::string folder;       ///< on disk
   StoredFiles stored = {};  ///< contents that were stored with a protocol; these are preferred
   OtherFiles others = OtherFiles::read;
+  bool kept = true;  ///< for a record; else they are read again when the object is built
 };
 
 /// The file that a key names, beside the protocol or stored with it; null and a fault where there

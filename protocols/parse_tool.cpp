@@ -8,7 +8,7 @@ namespace {
 
 using nlohmann::json;
 
-constexpr NumberRange kPlace{-10, 10, "m"};
+constexpr NumberRange kToolPlace{-10, 10, "m"};
 constexpr NumberRange kWorld{-1000, 1000, "m"};
 constexpr NumberRange kGravity{-1000, 1000, "m/s^2"};
 constexpr NumberRange kFactor{0, 100, "", true};
@@ -18,8 +18,8 @@ constexpr double kShortest = 1e-6;  // m: a shorter segment is a slip of the dec
 
 ToolSegmentSpec read_segment(ObjectReader& reader) {
   ToolSegmentSpec segment;
-  reader.vector("from_m", segment.from, kPlace, Presence::required);
-  reader.vector("to_m", segment.to, kPlace, Presence::required);
+  reader.vector("from_m", segment.from, kToolPlace, Presence::required);
+  reader.vector("to_m", segment.to, kToolPlace, Presence::required);
   reader.refuse_unknown_keys();
   return segment;
 }

@@ -155,8 +155,8 @@ struct ObjectSpec {
   double scale = 1;       ///< mesh: m for each unit of the file
   /// mesh: paths of all files read from the disk for it, including a .gltf's buffers.
   std::vector<std::string> files_read;
-  /// mesh: the file's contents when the protocol or scene was read; nullptr: read them from the
-  /// disk.
+  /// mesh: the file's contents when the protocol was read, for the record; nullptr: read them from
+  /// the disk, as for a scene.
   std::shared_ptr<const std::string> file_bytes;
   std::vector<ObjectSpec> parts;  ///< compound: placed relative to the compound
   Pose pose;

@@ -122,7 +122,7 @@ class Tree {
 
  private:
   using Key = std::pair<std::uint64_t, Index>;
-  static constexpr Index kLeaf = 4;
+  static constexpr Index kLeaf = 10;
 
   Index face_of(Index t) const {
     return surface_.flat_face.empty() ? kNoFlatFace : surface_.flat_face[t];

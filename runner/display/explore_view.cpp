@@ -24,7 +24,7 @@ namespace {
 
 constexpr float kOrbitPerPixel = 0.008F;  // rad
 constexpr float kZoomPerNotch = 1.12F;
-constexpr ImU32 kQuietInk = IM_COL32(150, 158, 168, 255);
+constexpr ImU32 kFaintInk = IM_COL32(150, 158, 168, 255);
 
 constexpr float kSliderWords = 10;  // widths of a letter, for name and value beside a slider
 
@@ -164,7 +164,7 @@ void ExploreView::draw_axes(float right, float low) const {
 void ExploreView::draw_over_scene(float x, float y, float width, float height) const {
   const float font = ImGui::GetFontSize();
   draw_axes(x + width, y + height);
-  ImGui::GetWindowDrawList()->AddText({x + 0.8F * font, y + height - 1.6F * font}, kQuietInk,
+  ImGui::GetWindowDrawList()->AddText({x + 0.8F * font, y + height - 1.6F * font}, kFaintInk,
                                       hint().c_str());
 }
 

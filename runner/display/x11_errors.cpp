@@ -1,6 +1,5 @@
 #include "runner/display/x11_errors.h"
 
-#define GLFW_INCLUDE_NONE
 #include <GLFW/glfw3.h>
 #include <X11/Xatom.h>
 #include <X11/Xlib.h>

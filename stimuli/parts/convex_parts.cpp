@@ -97,8 +97,8 @@ bool is_plainly_concave(const PolygonSoup& soup) {
     if (corners.size() >= 3) planes.push_back(plane_of(corners));
   }
   const auto width = [](const PolygonPlane& plane) {
-    const double width = plane.area / plane.diameter;
-    return width > 0 ? width : 0;  // not a number: there is no such plane
+    const double mean = plane.area / plane.diameter;
+    return mean > 0 ? mean : 0;  // not a number: there is no such plane
   };
   std::ranges::sort(planes, std::greater(), width);
   planes.resize(std::min(planes.size(), kFaces));

@@ -23,6 +23,7 @@ namespace po = boost::program_options;
 
 using evidence::Explanation;
 using evidence::StageCost;
+using Json = nlohmann::ordered_json;
 
 std::string nanoseconds(const std::optional<double>& ns) {
   if (!ns) return "-";
@@ -109,7 +110,6 @@ std::string to_text(const Explanation& e) {
 }
 
 nlohmann::ordered_json to_json(const Explanation& e) {
-  using Json = nlohmann::ordered_json;
   const auto figure = [](const std::optional<double>& value) {
     return value ? Json(*value) : Json(nullptr);
   };
