@@ -842,7 +842,7 @@ StudyCheck check_study(const Registration& registered, const std::string& folder
       alpha_at(registered, study.participants.size()));
 
   StudyCheck out;
-  out.label = analysis::label_of(table);
+  out.label = analysis::simulated_label(table.of_trials);
   out.participants = study.participants.size();
   out.removed = study.removed;
   out.without_trials = people_without_trials(study);
