@@ -180,6 +180,8 @@ class TaskJudgement {
 
 /// Hypotheses for each block of a protocol; null: nothing to identify, or stimuli of one shape.
 using BlockHypotheses = std::vector<std::shared_ptr<const ShapeHypotheses>>;
+/// Reasons why stimuli of a block that asks for the shape alone cannot be told.
+std::vector<std::string> unknown_shapes(const protocols::Protocol& protocol);
 /// \throws MeshError
 BlockHypotheses block_hypotheses(const protocols::Protocol& protocol);
 
