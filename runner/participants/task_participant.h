@@ -1,7 +1,7 @@
 #pragma once
-// A simulated participant for the tasks of version 2. It identifies shapes as SimulatedParticipant
-// does, percept by percept. In all other tasks it explores likewise for a while and judges levels
-// from contact if contact reveals them; the model is given the other levels. It reaches as Reacher.
+// A simulated participant for all tasks. It identifies shapes as SimulatedParticipant does, percept
+// by percept. In all other tasks it explores likewise for a while and judges levels from contact if
+// contact reveals them; the model is given the other levels. It reaches as Reacher.
 
 #include <cstdint>
 #include <functional>
