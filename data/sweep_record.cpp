@@ -157,7 +157,6 @@ std::vector<std::string> figure_columns(const SweepPlan& plan) {
   std::vector<std::string> out;
   for (const TaskCellColumns& cell : task_columns(plan))
     out.insert(out.end(), cell.columns.begin(), cell.columns.end());
-  if (!out.empty()) return out;
   for (const char* what : {"gain_", "gain_se_"}) {
     for (const std::string& shape : plan.shapes) out.push_back(what + shape);
   }
@@ -175,7 +174,6 @@ std::vector<EstimateColumns> estimate_columns(const SweepPlan& plan) {
     for (std::size_t c = 0; c < cell.columns.size(); c += 2)
       out.push_back({cell.columns[c], cell.columns[c + 1]});
   }
-  if (!out.empty()) return out;
   for (const std::string& shape : plan.shapes) out.push_back({"gain_" + shape, "gain_se_" + shape});
   return out;
 }

@@ -22,7 +22,7 @@ struct SweepPlan {
   int participants = 7;
   std::string program_version;
   std::vector<std::string> parameters;         ///< names, as the space lists them
-  std::vector<std::string> shapes, renderers;  ///< names, as the protocol lists them
+  std::vector<std::string> shapes, renderers;  ///< with columns of their own; empty: blocks have
   /// false: of a file from before cells of factors had columns; those of their blocks are empty.
   bool has_cells = true;
 };

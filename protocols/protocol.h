@@ -190,6 +190,7 @@ struct TaskBlock {
   /// practice: its trials come again in rounds; none: once
   std::optional<PracticeCriterion> criterion;
   bool practice_feedback = false;  ///< whatever `feedback` says
+  bool by_shape = false;           ///< identify: the shape, whatever else differs
 };
 
 /// A text to read or questions to answer, before the first block, between blocks or after the last.

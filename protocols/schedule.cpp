@@ -253,7 +253,7 @@ TaskBlock shapes_block(const Protocol& protocol) {
   block.announced = false;
   block.renderers = protocol.renderers;
   block.repetitions = protocol.repetitions;
-  block.practice_feedback = true;
+  block.practice_feedback = block.by_shape = true;
   for (const StimulusSpec& stimulus : protocol.stimuli) {
     block.stimuli.push_back(static_cast<int>(block.stimuli.size()));
     block.answers.push_back({"", stimulus.name, ""});

@@ -158,7 +158,7 @@ PUBLIC = {
     "runner/movement": "movement_study touched_trial",
     "runner/evidence/reports": "accuracy_report boundary_report scene_report stability_report stability_study",
     "runner/registration": "about_file answers bundle_contents deviations planned_conditions planned_studies registration registration_text sealed_folder",
-    "runner/study": "cue_study export_settings schedule_text simulation_limits study_order study_trials task_words",
+    "runner/study": "cue_study duration export_settings schedule_text simulation_limits study_order study_trials task_words",
     "runner/serve": "loopback network page_server served_scene served_session",
     "runner/design": "design_page protocol_file rehearsal",
     "runner/sweep": "cluster_folder cluster_job planned_sweep slurm",

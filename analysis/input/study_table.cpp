@@ -426,6 +426,12 @@ void warn_of_alike_names(StudyTable& table) {
   warn_of_alike("Stimuli", shapes.names(), table.warnings);
 }
 
+Simulated simulated_in(const std::vector<StudyTrial>& trials) {
+  const auto n = static_cast<std::size_t>(std::ranges::count(trials, true, &StudyTrial::simulated));
+  if (n == 0) return Simulated::no;
+  return n == trials.size() ? Simulated::yes : Simulated::mixed;
+}
+
 bool is_wanted(const std::vector<std::string>& wanted, std::string_view name,
                std::string_view sha256) {
   return wanted.empty() || std::ranges::any_of(wanted, [&](const std::string& one) {
@@ -541,6 +547,7 @@ StudyTable read_tasks_csv(const std::string& path, const std::vector<std::string
   put_protocols(protocols, path, table);
   if (numbered) order_trials(table.trials);
   drop_missing_answers(table.trials);
+  table.of_trials = simulated_in(table.trials);
   warn_of_alike_names(table);
   torque.warn(table.warnings);
   return table;
@@ -616,6 +623,7 @@ StudyTable read_tasks_store(data::Store& store, const std::string& protocol) {
         {{path, "trials",
           "expected at least one completed trial that is not practice" +
               (protocol.empty() ? "" : " of the protocol " + printable(protocol))}});
+  table.of_trials = simulated_in(table.trials);
   warn_of_alike_names(table);
   torque.warn(table.warnings);
   return table;
@@ -633,6 +641,7 @@ StudyTable of_shapes(TrialTable times, const std::string& source,
   order_shapes(times, order);
   table.source = source;
   table.simulated = times.simulated != Simulated::no;
+  table.of_trials = times.simulated;
   table.provenance = times.provenance;
   table.times = std::move(times);
   return table;

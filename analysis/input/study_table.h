@@ -36,10 +36,11 @@ struct StudyTable {
   /// Identification without catch trials and levels; none: nothing is identified, or the source
   /// lacks its times or numbers.
   std::optional<TrialTable> times;
-  std::size_t n_practice = 0;  ///< left out
-  bool simulated = false;      ///< some participants are simulated
-  Provenance provenance;       ///< of all trials
-  std::string title;           ///< of the study, from its protocol; "": unknown
+  std::size_t n_practice = 0;           ///< left out
+  bool simulated = false;               ///< some participants are simulated
+  Simulated of_trials = Simulated::no;  ///< without practice
+  Provenance provenance;                ///< of all trials
+  std::string title;                    ///< of the study, from its protocol; "": unknown
   std::vector<std::string> warnings;
   GroupLabels group_labels;
   std::vector<StudyFactor> factors;  ///< crossed; a trial's cell is in the name of its stimulus

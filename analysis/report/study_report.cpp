@@ -1,7 +1,5 @@
 #include "analysis/report/study_report.h"
 
-#include <algorithm>
-#include <cstddef>
 #include <memory>
 #include <utility>
 
@@ -76,15 +74,6 @@ std::string study_html(const StudyAnalysis& analysis, const StudyRecord& record)
 
 std::vector<Figure> study_figures(const StudyAnalysis& analysis, const StudyRecord& record) {
   return report_of(analysis)->figures(record);
-}
-
-std::string label_of(const StudyTable& table) {
-  if (table.trials.empty() && table.times) return simulated_label(table.times->simulated);
-  const auto n =
-      static_cast<std::size_t>(std::ranges::count(table.trials, true, &StudyTrial::simulated));
-  return simulated_label(n == 0                     ? Simulated::no
-                         : n == table.trials.size() ? Simulated::yes
-                                                    : Simulated::mixed);
 }
 
 }  // namespace palpate::analysis

@@ -16,7 +16,4 @@ std::string study_json(const StudyAnalysis& analysis);
 std::string study_html(const StudyAnalysis& analysis, const StudyRecord& record);
 std::vector<Figure> study_figures(const StudyAnalysis& analysis, const StudyRecord& record);
 
-/// "SIMULATED PARTICIPANTS"; "": people.
-std::string label_of(const StudyTable& table);
-
 }  // namespace palpate::analysis

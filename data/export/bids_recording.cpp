@@ -117,7 +117,7 @@ const Column kTrialOfSample{"trial", "Trial within the session, from 1, to which
 
 std::vector<Column> columns_of(const StudyLabel& study, bool contacts) {
   std::vector<Column> all{kTrialOfSample};
-  for (const Column& column : interval_columns(study.facts)) all.push_back(column);
+  for (const Column& column : dataset_form(study.facts).intervals) all.push_back(column);
   all.insert(all.end(), sample_columns().begin(), sample_columns().end());
   if (has_bodies(study.facts)) all.insert(all.end(), body_columns().begin(), body_columns().end());
   if (contacts) all.insert(all.end(), contact_columns().begin(), contact_columns().end());
@@ -302,7 +302,7 @@ void BidsRecording::add(const StoredTrial& trial, const std::string& path) {
   if (record.samples.empty()) return;
   SampleSlots slots(trial, study_.facts.servo_rate);
   const bool bodies = has_bodies(study_.facts);
-  const std::span<const Column> intervals = interval_columns(study_.facts);
+  const std::span<const Column> intervals = dataset_form(study_.facts).intervals;
   const std::string nothing = empty_row(columns_.size());
   std::vector<std::optional<TickContact>> contacts;
   if (settings_.contacts) contacts = settings_.contacts(trial);

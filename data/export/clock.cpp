@@ -57,14 +57,9 @@ std::vector<std::string> dimensions_of(const std::vector<StoredProtocol>& protoc
 ExportClock::ExportClock(const std::vector<ProtocolInfo>& protocols, Times times)
     : times_(times), groups_(protocols) {
   std::vector<StoredProtocol> stored;
-  for (const ProtocolInfo& protocol : protocols)
+  for (const ProtocolInfo& protocol : protocols) {
     stored.push_back(read_stored_protocol(protocol.text));
-  for (const StoredProtocol& protocol : stored) {
-    tasks_ |= !protocol.blocks.empty();
-    reaches_ |=
-        std::ranges::find(protocol.blocks, "reach", &StoredBlock::task) != protocol.blocks.end();
-    seen_ |= protocol.has_view;
-    heard_ |= protocol.has_sound;
+    protocols_.emplace(protocol.sha256, stored.back());
   }
   factors_ = factors_of(stored);
   dimensions_ = dimensions_of(stored);

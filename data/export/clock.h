@@ -3,6 +3,7 @@
 // first trial.
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <string>
 #include <string_view>
@@ -23,14 +24,8 @@ class ExportClock {
   ExportClock(const std::vector<ProtocolInfo>& protocols, Times times);
   ExportClock() : times_(Times::absolute) {}
 
-  /// Whether rows of trials have the columns of tasks: a protocol of the database has blocks.
-  bool tasks() const { return tasks_; }
-  /// Whether they have those of movements, too: a protocol has blocks of reaching.
-  bool reaches() const { return reaches_; }
-  /// Whether they have those of what was seen: a protocol has a view.
-  bool seen() const { return seen_; }
-  /// Whether they have that of what was heard: a stimulus has a sound.
-  bool heard() const { return heard_; }
+  /// By checksum. Rows of trials have the columns that any of them needs.
+  const std::map<std::string, StoredProtocol, std::less<>>& protocols() const { return protocols_; }
   /// Rows of trials have the column torque_driven if any run left torque out.
   const TorqueNotes& torque() const { return torque_; }
 
@@ -57,7 +52,7 @@ class ExportClock {
  private:
   std::int64_t since_first(const Participant& person, std::int64_t unix_ns) const;  // ns
   Times times_;
-  bool tasks_ = false, reaches_ = false, seen_ = false, heard_ = false;
+  std::map<std::string, StoredProtocol, std::less<>> protocols_;
   TorqueNotes torque_;
   ParticipantGroups groups_;
   std::vector<StoredFactor> factors_;

@@ -58,7 +58,7 @@ void put_attempt(DelimitedRow& row, const StoredTrial& attempt, const ExportCloc
 void put_sample(DelimitedRow& row, const SampleRecord& sample);
 /// contact_columns(), positions rounded to 1 nm; missing in free space.
 void put_contact(DelimitedRow& row, const std::optional<TickContact>& contact);
-/// \param columns  as interval_columns()
+/// \param columns  DatasetForm::intervals
 void put_interval(DelimitedRow& row, std::span<const Column> columns, int interval);
 /// Whether a stimulus of the protocol moves: samples then have body_columns() as well.
 bool has_bodies(const ProtocolFacts& facts);

@@ -155,8 +155,7 @@ std::string dataset_name(const std::map<std::string, StudyLabel>& labels, bool s
 }
 
 std::string dataset_description(const std::map<std::string, StudyLabel>& labels, bool simulated) {
-  std::string text =
-      all_facts(labels).blocks.empty() ? "Identification of shapes" : "Judgements of objects";
+  std::string text = dataset_form(all_facts(labels)).study;
   text += " by touch through a force-feedback stylus, one row a trial, recorded by palpate.";
   for (const auto& [sha256, study] : labels) {
     if (!study.facts.title.empty())

@@ -422,7 +422,6 @@ void add_to_list(std::string& list, std::optional<double> value, bool first) {
 
 TaskValues::TaskValues(const TrialRecord& record) {
   const TaskRecord& from = record.task;
-  if (!from.of_block()) return;
   task = from.task;
   block_name = from.block_name;
   track = from.track;
@@ -484,18 +483,38 @@ void put_torque(DelimitedRow& row, const StoredTrial& trial, const ExportClock& 
   row << clock.torque().driven(trial);
 }
 
-/// Columns of trials that only some protocols need, in their order.
+bool has_reaches(const StoredProtocol& protocol) {
+  return std::ranges::find(protocol.blocks, "reach", &StoredBlock::task) != protocol.blocks.end();
+}
+
+/// Columns of trials that only some protocols need, in their order. They are missing in rows of
+/// other protocols.
 struct TrialPart {
-  bool (*has)(const ExportClock&);
+  bool (*of)(const StoredProtocol&, const ExportClock&);
   void (*describe)(std::vector<Column>&, const ExportClock&);
   void (*put)(DelimitedRow&, const StoredTrial&, const ExportClock&);
 };
+using Clock = ExportClock;
 constexpr std::array<TrialPart, 5> kParts{
-    {{[](const ExportClock& clock) { return clock.tasks(); }, describe_tasks, put_task},
-     {[](const ExportClock& clock) { return clock.reaches(); }, describe_reaches, put_reach},
-     {[](const ExportClock& clock) { return clock.seen(); }, describe_sight, put_sight},
-     {[](const ExportClock& clock) { return clock.heard(); }, describe_sound, put_sound},
-     {[](const ExportClock& clock) { return clock.torque().any(); }, describe_torque, put_torque}}};
+    {{[](const StoredProtocol& p, const Clock&) { return !p.blocks.empty(); }, describe_tasks,
+      put_task},
+     {[](const StoredProtocol& p, const Clock&) { return has_reaches(p); }, describe_reaches,
+      put_reach},
+     {[](const StoredProtocol& p, const Clock&) { return p.has_view; }, describe_sight, put_sight},
+     {[](const StoredProtocol& p, const Clock&) { return p.has_sound; }, describe_sound, put_sound},
+     {[](const StoredProtocol&, const Clock& clock) { return clock.torque().any(); },
+      describe_torque, put_torque}}};
+
+bool has(const ExportClock& clock, const TrialPart& part) {
+  return std::ranges::any_of(clock.protocols(),
+                             [&](const auto& one) { return part.of(one.second, clock); });
+}
+
+void leave_out(DelimitedRow& row, const TrialPart& part, const ExportClock& clock) {
+  std::vector<Column> columns;
+  part.describe(columns, clock);
+  for (std::size_t i = 0; i < columns.size(); ++i) row << "";
+}
 
 /// Which columns a table has.
 struct ColumnSets {
@@ -517,7 +536,7 @@ struct ColumnSets {
 /// \param cut_off  of attempts that were cut off
 std::span<const Column> columns_for(const ExportClock& clock, bool cut_off) {
   ColumnSets sets{.cut_off = cut_off, .relative = clock.relative(), .groups = clock.groups().any()};
-  for (std::size_t i = 0; i < kParts.size(); ++i) sets.parts[i] = !cut_off && kParts[i].has(clock);
+  for (std::size_t i = 0; i < kParts.size(); ++i) sets.parts[i] = !cut_off && has(clock, kParts[i]);
   for (const StoredFactor& factor : clock.factors()) {
     sets.levels.emplace_back(factor.name, "");
     sets.levels.insert(sets.levels.end(), factor.levels.begin(), factor.levels.end());
@@ -555,10 +574,12 @@ std::span<const Column> attempt_columns(const ExportClock& clock) {
 
 const Column& group_column() { return kGroup; }
 
-std::span<const Column> interval_columns(const ProtocolFacts& facts) {
-  static const Column interval{"interval",
-                               "Interval of the trial, from 1, to which the tick belongs", "1"};
-  return {&interval, facts.blocks.empty() ? std::size_t{0} : 1};
+const DatasetForm& dataset_form(const ProtocolFacts& facts) {
+  static const DatasetForm of_shapes{"Identification of shapes", {}};
+  static const DatasetForm of_blocks{
+      "Judgements of objects",
+      {{"interval", "Interval of the trial, from 1, to which the tick belongs", "1"}}};
+  return facts.blocks.empty() ? of_shapes : of_blocks;
 }
 
 std::span<const Column> sample_columns() {
@@ -578,8 +599,12 @@ std::span<const Column> body_columns() {
 
 void put_columns_of_trial(DelimitedRow& row, const StoredTrial& trial, const ExportClock& clock) {
   put_plain_columns(row, trial, clock);
+  const StoredProtocol& protocol = clock.protocols().at(trial.protocol_sha256);
   for (const TrialPart& part : kParts) {
-    if (part.has(clock)) part.put(row, trial, clock);
+    if (part.of(protocol, clock))
+      part.put(row, trial, clock);
+    else if (has(clock, part))
+      leave_out(row, part, clock);
   }
   if (clock.relative()) row << clock.elapsed(trial);
 }

@@ -36,7 +36,11 @@ std::span<const Column> sample_columns();  ///< of a servo tick, in order
 std::span<const Column> body_columns();
 /// After those, if contacts are requested.
 std::span<const Column> contact_columns();
-/// Before them: the interval of a trial, if its protocols have blocks; else none.
-std::span<const Column> interval_columns(const ProtocolFacts& facts);
+/// How a dataset shows a study.
+struct DatasetForm {
+  const char* study;              ///< begins its description
+  std::vector<Column> intervals;  ///< before those of a sample
+};
+const DatasetForm& dataset_form(const ProtocolFacts& facts);
 
 }  // namespace palpate::data

@@ -101,7 +101,7 @@ class PsychDsWriter : public DatasetWriter {
   void write_samples(const StoredTrial& trial, const std::string& stem, const ProtocolFacts& facts);
   Json variables() const;
 
-  const std::span<const Column> intervals_ = interval_columns(all_facts(labels_));
+  const std::span<const Column> intervals_ = dataset_form(all_facts(labels_)).intervals;
   std::set<std::string> used_;  // columns
   std::int64_t participant_ = -1;
   int session_ = 0;  // of haptic_

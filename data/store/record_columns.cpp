@@ -58,8 +58,7 @@ std::optional<double> amount_of(Whole) {
 void validate_task(Validator& validator, const TaskRecord& task) {
   validator.present("task", task.task);
   validator.text("block_name", task.block_name);
-  validator.expect(task.of_block() || task.task == TaskRecord().task,
-                   "a task of no block must be identification");
+  validator.expect(is_storable(task), "a task of no block must be identification");
   validator.positive("track", task.track);
   for (const auto& value : {task.level, task.standard_level, task.number, task.confidence}) {
     if (value) validator.finite("a number of the task", *value);
@@ -204,10 +203,8 @@ const char* task_column(int version) { return version < 5 ? "NULL, " : "a.task, 
 void read_task(RowReader& row, TrialRecord& record) {
   std::optional<std::string> text;
   row >> text;
-  record.task = {};
-  if (!text) return;
   try {
-    record.task = parse_task_text(*text);
+    record.task = parse_task_text(text);
   } catch (const std::invalid_argument& error) {
     throw SQLite::Exception(error.what(), SQLITE_CORRUPT);
   }

@@ -59,6 +59,10 @@ bool gives_torque(const std::string& renderer) { return !renderer.empty() && ren
 
 }  // namespace
 
+bool is_storable(const TaskRecord& task) {
+  return task.task == TaskRecord().task || task_text(task).has_value();
+}
+
 std::optional<std::string> task_text(const TaskRecord& task) {
   if (!task.of_block()) return std::nullopt;
   Json out = {{"task", task.task}, {"block_name", task.block_name}, {"track", task.track}};
@@ -94,9 +98,10 @@ std::optional<std::string> task_text(const TaskRecord& task) {
   return out.dump();
 }
 
-TaskRecord parse_task_text(const std::string& text) {
+TaskRecord parse_task_text(const std::optional<std::string>& text) {
+  if (!text) return {};
   try {
-    const Json in = read_ordered_json(text);
+    const Json in = read_ordered_json(*text);
     TaskRecord task;
     task.task = in.at("task").get<std::string>();
     task.block_name = in.at("block_name").get<std::string>();

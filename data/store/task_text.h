@@ -13,9 +13,11 @@
 
 namespace palpate::data {
 
+/// Whether it can be read again: without a text a task is identification.
+bool is_storable(const TaskRecord& task);
 std::optional<std::string> task_text(const TaskRecord& task);
 /// The inverse. \throws std::invalid_argument: damaged
-TaskRecord parse_task_text(const std::string& text);
+TaskRecord parse_task_text(const std::optional<std::string>& text);
 
 /// The note of a run with a device that senses the stylus's axis but drives force alone.
 inline constexpr const char* kTorqueLeftOutNote = R"({"torque":"left out"})";

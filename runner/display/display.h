@@ -194,7 +194,7 @@ struct ConsoleState {
   /// W, that fields which depend on velocity put into the hand; none: there are no such fields.
   std::optional<double> field_power;
   // Version 2 of protocols:
-  std::string task;                 ///< "compare", ...; empty: version 1
+  std::string task;                 ///< "compare", ...; empty: no interval is announced
   int interval = 0, intervals = 0;  ///< number within the trial, and their count
   std::string level;                ///< level presented now, as text; empty: none
   std::string level_name;           ///< what varies: "stiffness"; empty: nothing

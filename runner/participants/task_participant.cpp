@@ -73,7 +73,7 @@ std::vector<int> forms_of(const protocols::Protocol& protocol, const protocols::
   std::vector<int> out;
   for (const int stimulus : block.stimuli) {
     const auto& one = protocol.stimuli[static_cast<std::size_t>(stimulus)];
-    const bool known = std::ranges::any_of(out, [&](int other) {
+    const bool known = !block.by_shape && std::ranges::any_of(out, [&](int other) {
       const auto& before = protocol.stimuli[static_cast<std::size_t>(other)];
       return base_name(before.name) == base_name(one.name) &&
              have_one_form(before.object, one.object);
@@ -86,6 +86,7 @@ std::vector<int> forms_of(const protocols::Protocol& protocol, const protocols::
 /// Whether the observer of shapes can identify a block's stimuli.
 bool is_identified_by_shape(const protocols::Protocol& protocol,
                             const protocols::TaskBlock& block) {
+  if (block.by_shape) return true;
   if (block.task != protocols::TaskKind::identify || !protocols::targets_of(block).empty())
     return false;
   const std::vector<int> forms = forms_of(protocol, block);
@@ -486,6 +487,18 @@ int TaskJudgement::confidence(int steps) const {
   return static_cast<int>(share * steps);
 }
 
+std::vector<std::string> unknown_shapes(const protocols::Protocol& protocol) {
+  std::vector<std::string> out;
+  for (const protocols::TaskBlock& block : protocol.blocks) {
+    for (std::size_t i = 0; block.by_shape && i < block.stimuli.size(); ++i) {
+      const auto& stimulus = protocol.stimuli[static_cast<std::size_t>(block.stimuli[i])];
+      const std::string fault = ShapeHypotheses::fault_of(stimulus.object);
+      if (!fault.empty()) out.push_back("stimulus '" + stimulus.name + "': " + fault);
+    }
+  }
+  return out;
+}
+
 BlockHypotheses block_hypotheses(const protocols::Protocol& protocol) {
   BlockHypotheses all;
   std::map<std::vector<int>, std::shared_ptr<const ShapeHypotheses>> known;
@@ -537,6 +550,7 @@ void TaskParticipant::begin_trial(const protocols::Trial& trial) {
   judgement_.begin(trial, Random(seed_, {static_cast<std::uint64_t>(number_),
                                          static_cast<std::uint64_t>(trial.session),
                                          static_cast<std::uint64_t>(trial.trial), kJudgement}));
+  if (!block().announced) begin_interval(trial_, {.shown = &trial_.intervals.front()});
 }
 
 void TaskParticipant::begin_interval(const protocols::Trial& trial, const IntervalView& view) {
@@ -571,7 +585,7 @@ Answer TaskParticipant::answer(std::int64_t time_ns) {
   return given;
 }
 
-/// As in version 1; the shape found is converted to an answer by its name.
+/// The shape found is converted to an answer by its name.
 std::optional<Answer> TaskParticipant::identify(const servo::Sample& sample) {
   std::optional<Answer> found = identifier_->step(sample);
   if (!found) return found;

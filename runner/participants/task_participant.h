@@ -1,7 +1,7 @@
 #pragma once
-// A simulated participant for the tasks of version 2. It identifies shapes as SimulatedParticipant
-// does, percept by percept. In all other tasks it explores likewise for a while and judges levels
-// from contact if contact reveals them; the model is given the other levels. It reaches as Reacher.
+// A simulated participant for all tasks. It identifies shapes as SimulatedParticipant does, percept
+// by percept. In all other tasks it explores likewise for a while and judges levels from contact if
+// contact reveals them; the model is given the other levels. It reaches as Reacher.
 
 #include <cstdint>
 #include <functional>
@@ -180,6 +180,8 @@ class TaskJudgement {
 
 /// Hypotheses for each block of a protocol; null: nothing to identify, or stimuli of one shape.
 using BlockHypotheses = std::vector<std::shared_ptr<const ShapeHypotheses>>;
+/// Reasons why stimuli of a block that asks for the shape alone cannot be told.
+std::vector<std::string> unknown_shapes(const protocols::Protocol& protocol);
 /// \throws MeshError
 BlockHypotheses block_hypotheses(const protocols::Protocol& protocol);
 

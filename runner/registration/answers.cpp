@@ -81,6 +81,18 @@ std::string deviations_in_words(const analysis::ThresholdStudy& study) {
          (study.measure == analysis::PlannedMeasure::adaptation ? "." : " (m).");
 }
 
+/// The registration of a kind of study.
+struct StudyRules {
+  std::unique_ptr<StudyAnswers> (*answers)(const Registration& made);
+  void (*require)(const protocols::Protocol& protocol, const std::string& path);
+};
+constexpr StudyRules kOfShapes{identification_answers, require_two_renderers};
+constexpr StudyRules kOfTasks{task_answers, require_own_trials};
+
+const StudyRules& rules_of(const protocols::Protocol& protocol) {
+  return protocols::is_study_of_shapes(protocol) ? kOfShapes : kOfTasks;
+}
+
 }  // namespace
 
 std::vector<Paragraph> plan_of_measure(const Registration& made) {
@@ -122,8 +134,11 @@ std::string accuracy_in_words() {
 }
 
 std::unique_ptr<StudyAnswers> study_answers(const Registration& made) {
-  return protocols::is_study_of_shapes(made.protocol) ? identification_answers(made)
-                                                      : task_answers(made);
+  return rules_of(made.protocol).answers(made);
+}
+
+void require_registrable(const protocols::Protocol& protocol, const std::string& path) {
+  rules_of(protocol).require(protocol, path);
 }
 
 }  // namespace palpate::runner::registration

@@ -77,8 +77,12 @@ std::vector<Paragraph> plan_of_measure(const Registration& made);
 std::string accuracy_in_words();
 
 std::unique_ptr<StudyAnswers> study_answers(const Registration& made);
+/// Requires a study that study_answers() can speak of. \throws UsageError
+void require_registrable(const protocols::Protocol& protocol, const std::string& path);
 
 std::unique_ptr<StudyAnswers> identification_answers(const Registration& made);
+void require_two_renderers(const protocols::Protocol& protocol, const std::string& path);
 std::unique_ptr<StudyAnswers> task_answers(const Registration& made);
+void require_own_trials(const protocols::Protocol& protocol, const std::string& path);
 
 }  // namespace palpate::runner::registration

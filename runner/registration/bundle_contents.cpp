@@ -269,7 +269,7 @@ analysis::StudyTable own_table(const std::string& folder, const StudyData& study
 }
 
 void judge_all(analysis::StudyTable table, const Registration& registered, StudyCheck& check) {
-  check.label = analysis::label_of(table);
+  check.label = analysis::simulated_label(table.of_trials);
   const analysis::NamedResults results = analysis::named_results(
       analysis::study_json(study::analyze_study(std::move(table), registered.too_fast)),
       alpha_at(registered, check.participants));
@@ -307,7 +307,7 @@ void analyze_bundle(const std::string& folder, BundleFacts& facts) {
   analysis::StudyTable table = analysis::read_study_csv(trials, wanted, design.protocols);
   table.source = table.provenance.source = kTrials;
   if (table.times) table.times->provenance.source = kTrials;
-  facts.label = analysis::label_of(table);
+  facts.label = analysis::simulated_label(table.of_trials);
   facts.analysis = study::analyze_study(std::move(table), facts.too_fast);
 }
 

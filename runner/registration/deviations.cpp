@@ -56,9 +56,14 @@ study::ShownTrial shown_trial(const data::TrialRecord& record) {
   for (std::size_t i = 0; task.task == "compare" && i < task.intervals.size(); ++i) {
     if (!task.intervals[i].standard) comparison = static_cast<int>(i) + 1;
   }
-  out.row.task =
-      study::compared({record.block, task.block_name, task.track, task.level, task.catch_trial,
-                       comparison, task.reach ? task.reach->kind : "", out.outcome.point});
+  out.row.task = {record.block,
+                  task.block_name,
+                  task.track,
+                  task.level,
+                  task.catch_trial,
+                  comparison,
+                  task.reach ? task.reach->kind : "",
+                  out.outcome.point};
   return out;
 }
 
@@ -837,7 +842,7 @@ StudyCheck check_study(const Registration& registered, const std::string& folder
       alpha_at(registered, study.participants.size()));
 
   StudyCheck out;
-  out.label = analysis::label_of(table);
+  out.label = analysis::simulated_label(table.of_trials);
   out.participants = study.participants.size();
   out.removed = study.removed;
   out.without_trials = people_without_trials(study);

@@ -280,4 +280,9 @@ std::unique_ptr<StudyAnswers> identification_answers(const Registration& made) {
   return std::make_unique<IdentificationAnswers>(made);
 }
 
+void require_two_renderers(const protocols::Protocol& protocol, const std::string& path) {
+  if (protocol.renderers.size() != 2)
+    throw UsageError(path + ": /renderers: expected two renderers to compare, point and ray");
+}
+
 }  // namespace palpate::runner::registration

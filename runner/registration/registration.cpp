@@ -14,8 +14,7 @@
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
 #include "protocols/schedule.h"
-#include "protocols/session_plan.h"
-#include "protocols/tasks/block_order.h"
+#include "runner/registration/answers.h"
 #include "runner/registration/sealed_folder.h"
 #include "runner/study/study_order.h"
 #include "runner/usage_error.h"
@@ -404,14 +403,6 @@ Registration read_registration(const std::string& folder) {
   out.contradictions = contradictions_of(out, stated);
   out.digest = registration_digest(folder);
   return out;
-}
-
-void require_registrable(const protocols::Protocol& protocol, const std::string& path) {
-  if (protocols::is_external(protocol))
-    throw UsageError(path + ": /blocks: expected blocks whose trials the protocol determines: " +
-                     "another program chooses those of a block 'external'");
-  if (protocols::is_study_of_shapes(protocol) && protocol.renderers.size() != 2)
-    throw UsageError(path + ": /renderers: expected two renderers to compare, point and ray");
 }
 
 void require_files_below(const std::vector<data::ProtocolFile>& files) {

@@ -110,9 +110,6 @@ Registration read_registration(const std::string& folder);
 /// fault
 Registration parse_statement(const std::string& text, const std::string& file);
 
-/// Requires tasks whose trials palpate chooses, or two renderers to compare. \throws UsageError
-void require_registrable(const protocols::Protocol& protocol, const std::string& path);
-
 /// Requires that all names of a protocol's files lead below its folder. \throws UsageError
 void require_files_below(const std::vector<data::ProtocolFile>& files);
 

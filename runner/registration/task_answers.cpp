@@ -700,4 +700,10 @@ std::unique_ptr<StudyAnswers> task_answers(const Registration& made) {
   return std::make_unique<TaskAnswers>(made);
 }
 
+void require_own_trials(const protocols::Protocol& protocol, const std::string& path) {
+  if (protocols::is_external(protocol))
+    throw UsageError(path + ": /blocks: expected blocks whose trials the protocol determines: " +
+                     "another program chooses those of a block 'external'");
+}
+
 }  // namespace palpate::runner::registration

@@ -352,65 +352,6 @@ class SimulatedGroups {
   std::vector<std::unique_ptr<SimulatedStudy>> studies_;
 };
 
-/// How participants of a kind of study are simulated.
-class SimulatedKind {
- public:
-  virtual ~SimulatedKind() = default;
-  /// Reasons why they cannot be.
-  virtual std::vector<std::string> faults(const protocols::Protocol& protocol) const = 0;
-  virtual participants::BlockHypotheses hypotheses(const protocols::Protocol& protocol) const = 0;
-  virtual std::unique_ptr<participants::Respondent> participant(
-      const SimulatedStudy& study, const participants::SimulatedSettings& own, int number,
-      devices::SimulatedStylus& stylus) const = 0;
-};
-
-/// They identify every stimulus by its shape.
-class SimulatedShapes final : public SimulatedKind {
- public:
-  std::vector<std::string> faults(const protocols::Protocol& protocol) const override {
-    std::vector<std::string> out;
-    for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
-      const std::string fault = participants::ShapeHypotheses::fault_of(stimulus.object);
-      if (!fault.empty()) out.push_back("stimulus '" + stimulus.name + "': " + fault);
-    }
-    return out;
-  }
-  participants::BlockHypotheses hypotheses(const protocols::Protocol& protocol) const override {
-    std::vector<stimuli::ObjectSpec> objects;
-    for (const protocols::StimulusSpec& stimulus : protocol.stimuli)
-      objects.push_back(stimulus.object);
-    return {std::make_shared<const participants::ShapeHypotheses>(objects)};
-  }
-  std::unique_ptr<participants::Respondent> participant(
-      const SimulatedStudy& study, const participants::SimulatedSettings& own, int number,
-      devices::SimulatedStylus& stylus) const override {
-    return std::make_unique<participants::SimulatedParticipant>(
-        own, *study.of_blocks.front(), stylus, study.protocol, study.seed, number);
-  }
-};
-
-class SimulatedTasks final : public SimulatedKind {
- public:
-  std::vector<std::string> faults(const protocols::Protocol&) const override { return {}; }
-  participants::BlockHypotheses hypotheses(const protocols::Protocol& protocol) const override {
-    return participants::block_hypotheses(protocol);
-  }
-  std::unique_ptr<participants::Respondent> participant(
-      const SimulatedStudy& study, const participants::SimulatedSettings& own, int number,
-      devices::SimulatedStylus& stylus) const override {
-    return std::make_unique<participants::TaskParticipant>(own, study.hypotheses, study.of_blocks,
-                                                           stylus, study.protocol, study.seed,
-                                                           number, study.planned);
-  }
-};
-
-const SimulatedKind& kind_of(const protocols::Protocol& protocol) {
-  static const SimulatedShapes shapes;
-  static const SimulatedTasks tasks;
-  if (protocols::is_study_of_shapes(protocol)) return shapes;
-  return tasks;
-}
-
 devices::SimulatedStylus simulated_stylus(const protocols::Protocol& protocol,
                                           const participants::SimulatedSettings& settings) {
   return {settings.device, settings.hand, protocol.stylus.length, protocol.stylus.grip,
@@ -426,7 +367,7 @@ SimulatedStudy::SimulatedStudy(const protocols::Protocol& p,
       library(p),
       // Two equal shapes are never told apart, so the observer continues to perceive.
       hypotheses({stimuli::ObjectSpec{}, stimuli::ObjectSpec{}}),
-      of_blocks(kind_of(checked(p, library, s)).hypotheses(p)),
+      of_blocks(participants::block_hypotheses(checked(p, library, s))),
       seed(seed_) {}
 
 void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& session,
@@ -440,12 +381,13 @@ void run_simulated_session(const SimulatedStudy& study, const SimulatedSession& 
   servo::Servo servo(stylus, clock, protocol.servo_rate, servo::ForceLimits{},
                      workspace_of(protocol));
   if (protocol.passivity_controller) servo.control_passivity();
-  const std::unique_ptr<participants::Respondent> participant =
-      kind_of(protocol).participant(study, own, session.participant, stylus);
+  participants::TaskParticipant participant(own, study.hypotheses, study.of_blocks, stylus,
+                                            protocol, study.seed, session.participant,
+                                            study.planned);
   const Station station{protocol, study.library, session.plan, servo,
                         clock,    session.utc,   log,          session.advisor};
-  for (const data::TrialRecord& record : session.completed) participant->learn_from(record);
-  Session trials(station, *participant);
+  for (const data::TrialRecord& record : session.completed) participant.learn_from(record);
+  Session trials(station, participant);
   // A shown trial is recorded, even if the run stops after it.
   while (trials.state() != Session::State::end &&
          (trials.state() == Session::State::response || !halting())) {
@@ -521,7 +463,7 @@ std::vector<std::string> simulation_faults(const protocols::Protocol& protocol,
     faults.emplace_back(
         "another program chooses the stimuli of the task 'external': palpate serve runs it");
   }
-  const std::vector<std::string> own = kind_of(protocol).faults(protocol);
+  const std::vector<std::string> own = participants::unknown_shapes(protocol);
   faults.insert(faults.end(), own.begin(), own.end());
   try {  // patched settings may be invalid
     const participants::ShapeHypotheses hypotheses({stimuli::ObjectSpec{}});

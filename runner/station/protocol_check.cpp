@@ -17,16 +17,13 @@
 #include "runner/session/simulated_study.h"
 #include "runner/sound/sound_output.h"
 #include "runner/sound/sound_source.h"
+#include "runner/study/duration.h"
 #include "runner/study/study_order.h"
 
 namespace palpate::runner::station {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-// s, to feel a stimulus: to identify it, to judge it, to adjust it. The first is a little more than
-// in the paper; the others are guesses of the same kind.
-constexpr double kToIdentify = 10, kToJudge = 5, kToAdjust = 20;
 
 /// Place of a stimulus by its name, or by that with a level, "ball at 405"; "": there is none.
 std::string place_of_stimulus(const std::string& name, const protocols::Protocol& protocol) {
@@ -64,24 +61,6 @@ SplitReason split(const std::string& reason, const protocols::Protocol& protocol
             rest};
   }
   return {"", reason};
-}
-
-double seconds_of(const protocols::TaskBlock& block) {
-  switch (block.task) {
-    case protocols::TaskKind::identify:
-      return kToIdentify;
-    case protocols::TaskKind::adjust:
-      return kToAdjust;
-    default:
-      return kToJudge;
-  }
-}
-
-/// Stimuli felt in a trial.
-int felt_in_trial(const protocols::TaskBlock& block) {
-  if (block.task == protocols::TaskKind::compare || block.task == protocols::TaskKind::external)
-    return block.intervals;
-  return block.task == protocols::TaskKind::rate && block.standard ? 2 : 1;
 }
 
 Json verdict_json(const Verdict& verdict, const protocols::Protocol& protocol) {
@@ -253,23 +232,6 @@ std::vector<GroupedReason> grouped(const std::vector<std::string>& reasons,
   return out;
 }
 
-Duration duration_of(const protocols::Protocol& protocol) {
-  Duration out;
-  const std::vector<protocols::TrialCounts> counts = protocols::trial_counts(protocol);
-  for (std::size_t i = 0; i < protocol.blocks.size(); ++i) {
-    const protocols::TaskBlock& block = protocol.blocks[i];
-    const double felt = felt_in_trial(block), pauses = (felt - 1) * block.inter_interval;
-    const double limit = block.interval_limit.value_or(block.time_out);
-    const double one = std::min(seconds_of(block), limit);
-    const double rests = felt * protocol.home.rest + pauses;
-    // The limit of the answer counts from the begin of the last interval.
-    const double before = (felt - 1) * limit;
-    out.usual += static_cast<double>(counts[i].expected) * (felt * one + rests);
-    out.longest += static_cast<double>(counts[i].most) * (before + block.time_out + rests);
-  }
-  return out;
-}
-
 Json faults_json(const std::string& file, const std::vector<protocols::Fault>& faults) {
   Json out{{"version", 1}, {"file", file}, {"faults", Json::array()}};
   for (const protocols::Fault& fault : faults) {
@@ -305,10 +267,10 @@ Json protocol_json(const std::string& file, const protocols::Protocol& protocol,
     const protocols::Protocol& group = *protocol.group_protocols[i];
     add(group, StimulusLibrary(group), protocol.groups.true_name(i));
   }
-  Duration duration = duration_of(protocol);
+  study::Duration duration = study::duration_of(protocol);
   for (std::size_t i = 0; i < protocol.group_protocols.size(); ++i) {
     const protocols::Protocol& group = *protocol.group_protocols[i];
-    const Duration own = duration_of(group);
+    const study::Duration own = study::duration_of(group);
     out["groups"].push_back({{"name", protocol.groups.true_name(i)},
                              {"summary", summary_json(group)},
                              {"duration_s", own.usual},

@@ -1,6 +1,6 @@
 #pragma once
 // Results of `palpate validate` as values: faults, a summary, which devices can show it
-// and why not, how long a session takes.
+// and why not.
 
 #include <cstddef>
 #include <nlohmann/json.hpp>
@@ -52,13 +52,6 @@ struct GroupedReason {
 /// Joins sentences that differ only in the stimulus, its level or the renderer that they name.
 std::vector<GroupedReason> grouped(const std::vector<std::string>& reasons,
                                    const protocols::Protocol& protocol);
-
-/// s, all sessions of a participant together, without breaks and pages.
-struct Duration {
-  double usual = 0;    ///< at a typical time for each stimulus felt
-  double longest = 0;  ///< if every answer took until its limit
-};
-Duration duration_of(const protocols::Protocol& protocol);
 
 /// The faults of a file, or none, as JSON: {"version", "file", "faults"}.
 nlohmann::ordered_json faults_json(const std::string& file,

@@ -1,5 +1,6 @@
 #pragma once
-// The trials of a participant in order, as `palpate schedule` prints them.
+// A protocol in a few lines, as `palpate validate` prints it, and the trials of a participant in
+// order, as `palpate schedule` does.
 
 #include <string>
 #include <vector>
@@ -37,6 +38,8 @@ inline void check_participant_number(int participant) {
 
 /// Position of the interval compared with the standard, from 1; 0: none.
 int comparison_interval(const protocols::TaskBlock& block, const protocols::Trial& trial);
+
+std::string summary_text(const protocols::Protocol& protocol);
 
 /// Trials of adaptive blocks are an example: those of a participant whose threshold is in the
 /// middle of the levels.

@@ -36,9 +36,9 @@ OrderRow row_of(const Protocol& protocol, const protocols::Trial& trial) {
           protocols::to_string(trial.renderer),
           protocol.stimuli[static_cast<std::size_t>(trial.stimulus)].name,
           {q.w, q.x, q.y, q.z},
-          compared({trial.block, block.name, trial.track, trial.level, trial.catch_trial,
-                    comparison_interval(block, trial),
-                    block.reaching ? protocols::to_string(trial.reach) : "", trial.point})};
+          {trial.block, block.name, trial.track, trial.level, trial.catch_trial,
+           comparison_interval(block, trial),
+           block.reaching ? protocols::to_string(trial.reach) : "", trial.point}};
 }
 
 /// The order of the cells in tracks that they share.
@@ -121,9 +121,7 @@ bool is_level_asked(const protocols::SessionPlan& plan) {
 
 }  // namespace
 
-OrderRow::Task compared(OrderRow::Task task) {
-  return task.name.empty() ? OrderRow::Task() : std::move(task);
-}
+bool OrderRow::operator==(const OrderRow& other) const { return to_line(*this) == to_line(other); }
 
 std::string to_line(const OrderRow& row) {
   std::string line = std::to_string(row.session) + "," + row.renderer + "," + row.shape;

@@ -19,7 +19,6 @@ struct OrderRow {
   int session = 1;
   std::string renderer, shape;
   std::array<double, 4> orientation_wxyz{};
-  /// As default in the study of shapes, whose order is that of renderers and shapes alone.
   struct Task {
     int block = 1;     ///< number
     std::string name;  ///< of the block; "": of the study of shapes
@@ -29,10 +28,10 @@ struct OrderRow {
     int comparison = 0;              ///< its interval, from 1; 0: none is compared
     std::string reach = {};          ///< "field", "catch", "clamp"; "": no movement to a target
     std::vector<double> point = {};  ///< of several dimensions, in place of `level`
-    bool operator==(const Task&) const = default;
   };
   Task task = {};
-  bool operator==(const OrderRow&) const = default;
+  /// Compares what the order fixes: to_line().
+  bool operator==(const OrderRow& other) const;
 };
 
 /// A trial that was shown.
@@ -42,10 +41,7 @@ struct ShownTrial {
   protocols::TrialOutcome outcome = {};
 };
 
-/// The task of a trial, as it is compared: of a block without a name the default.
-OrderRow::Task compared(OrderRow::Task task);
-
-/// "session,renderer,shape,w,x,y,z" with 17 significant digits; of tasks followed by
+/// "session,renderer,shape,w,x,y,z" with 17 significant digits; of a block with a name followed by
 /// ",block,name,track,level,catch,comparison", of a movement to a target also ",field", of a level
 /// of several dimensions ",at,VALUE,VALUE,...".
 std::string to_line(const OrderRow& row);

@@ -17,6 +17,12 @@ SweepPlan plan_of(const std::string& blocks) {
   SweepPlan plan;
   plan.protocol = R"({"version": 2, "renderers": ["point", "ray"], "blocks": [)" + blocks + "]}";
   plan.parameters = {"delay"};
+  return plan;
+}
+
+SweepPlan plan_of_shapes() {
+  SweepPlan plan;
+  plan.protocol = R"({"version": 1})";
   plan.shapes = {"ball"};
   plan.renderers = {"point", "ray"};
   return plan;
@@ -109,8 +115,7 @@ TEST(SweepColumns, GroupsFollowWhereTheirSettingsVary) {
 }
 
 TEST(SweepColumns, Version1HasTimesByShapeAndRenderer) {
-  SweepPlan plan = plan_of("");
-  plan.protocol = R"({"version": 1})";
+  const SweepPlan plan = plan_of_shapes();
   EXPECT_TRUE(task_columns(plan).empty());
   EXPECT_EQ(figure_columns(plan),
             (Names{"gain_ball", "gain_se_ball", "time_point_ball", "time_ray_ball",
@@ -134,7 +139,7 @@ TEST(SweepPlans, NameAtMostFiveDifferences) {
   two.space = R"({"a": 2, "b": 2, "c": 2, "d": 2, "e": 2, "f": 2, "g": 2})";
   EXPECT_EQ(differences(one, two), Names{"space: /a 1 and 2; /b 1 and 2; /c 1 and 2; /d 1 and 2; "
                                          "/e 1 and 2; and 2 more"});
-  one = two = plan_of("");
+  one = two = plan_of_shapes();
   two.files_sha256 = "x";
   two.points = 7;
   two.renderers = {"ray"};

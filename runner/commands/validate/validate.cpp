@@ -1,22 +1,16 @@
 #include <algorithm>
-#include <array>
 #include <cstddef>
 #include <iomanip>
 #include <iostream>
 #include <iterator>
 #include <nlohmann/json.hpp>
-#include <sstream>
 #include <utility>
 
-#include "data/base/cell_name.h"
 #include "data/base/text.h"
 #include "data/base/words.h"
 #include "protocols/fault_list.h"
 #include "protocols/json_document.h"
 #include "protocols/parse.h"
-#include "protocols/schedule.h"
-#include "protocols/session_plan.h"
-#include "protocols/tasks/block_order.h"
 #include "protocols/tasks/texts.h"
 #include "runner/commands/shared/command.h"
 #include "runner/devices/device_delay.h"
@@ -28,7 +22,7 @@
 #include "runner/session/effect_check.h"
 #include "runner/session/simulated_study.h"
 #include "runner/station/protocol_check.h"
-#include "runner/study/task_words.h"
+#include "runner/study/schedule_text.h"
 #include "runner/touch/checked_meshes.h"
 #include "runner/touch/forces.h"
 #include "runner/touch/scene_notes.h"
@@ -51,100 +45,6 @@ void print_overlaps(const stimuli::ObjectSpec& object, const std::string& name,
   for (const std::string& overlap : stimuli::group_overlaps(object))
     out << "  note        " << name << " (" << printable(object.file_name)
         << "): " << printable(overlap) << "\n";
-}
-
-std::string time_in_words(double seconds) {
-  std::ostringstream out;
-  out << std::fixed << std::setprecision(0);
-  if (seconds < 60) {
-    out << seconds << " s";
-  } else if (seconds < 5400) {
-    out << seconds / 60 << " min";
-  } else {
-    out << std::setprecision(1) << seconds / 3600 << " h";
-  }
-  return out.str();
-}
-
-/// The summary's lines about what is heard, if there is anything.
-std::string heard(const protocols::Protocol& protocol) {
-  std::vector<std::string> sounding;
-  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
-    if (stimulus.sound && stimulus.name == base_name(stimulus.name))
-      sounding.push_back(stimulus.name);
-  }
-  std::ostringstream out;
-  if (!sounding.empty()) out << "  sounds      contacts of " << listed(sounding) << "\n";
-  if (!protocol.masking_noise) return out.str();
-  out << "  noise       " << protocols::to_string(protocol.masking_noise->kind) << ", "
-      << protocol.masking_noise->level_db << " dB re full scale, through headphones\n";
-  return out.str();
-}
-
-/// Prints the summary of a protocol of version 2.
-void print_task_summary(const protocols::Protocol& protocol, std::ostream& out) {
-  std::vector<std::string> renderers, stimuli;
-  for (const protocols::RendererKind kind : protocol.renderers)
-    renderers.emplace_back(protocols::to_string(kind));
-  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) {
-    if (stimulus.name == base_name(stimulus.name)) stimuli.push_back(stimulus.name);
-  }
-  long long trials = 0;
-  out << protocol.name << (protocol.title.empty() ? "" : ": " + printable(protocol.title))
-      << "\n  renderers   " << listed(renderers) << "\n  stimuli     " << listed(stimuli)
-      << "\n  blocks      " << protocol.blocks.size() << ", in " << protocol.sessions.count
-      << (protocol.sessions.count == 1 ? " session" : " sessions")
-      << (protocol.blocks_counterbalanced ? ", their order counterbalanced\n" : "\n");
-  for (const protocols::TaskBlock& block : protocol.blocks) {
-    trials += protocols::most_trials_of(block);
-    out << "    " << block.name << "\n";
-    for (const std::string& line : study::in_words(protocol, block))
-      out << "      " << line << "\n";
-  }
-  if (protocol.groups.any()) out << "  groups      " << study::groups_in_words(protocol) << "\n";
-  for (const protocols::PageSpec& page : protocol.pages) {
-    constexpr std::array kPlaces = {"before the first block", "before block ", "after the last"};
-    out << "  page        " << page.name << ", " << kPlaces[static_cast<std::size_t>(page.when)]
-        << page.before_block << "\n";
-  }
-  const std::vector<std::string> typed = study::keyboard_parts(protocol);
-  if (!typed.empty())
-    out << "  keyboard    needed beside a device's buttons for " << listed(typed) << "\n";
-  const station::Duration duration = station::duration_of(protocol);
-  out << "  trials      at most " << trials << " for each participant\n  duration    about "
-      << time_in_words(duration.usual) << ", at most " << time_in_words(duration.longest)
-      << "; breaks and pages besides\n"
-      << heard(protocol) << "  seed        " << protocol.seed << "\n"
-      << "  sha256      " << protocol.sha256 << "\n";
-}
-
-void print_summary(const protocols::Protocol& protocol, std::ostream& out) {
-  if (!protocols::is_study_of_shapes(protocol)) return print_task_summary(protocol, out);
-  const std::vector<protocols::Trial> trials = protocols::schedule(protocol, 1);
-  const long long counted = protocols::main_trials(protocol);
-  const int sessions = protocol.sessions.count;
-  std::vector<std::string> renderers, stimuli;
-  for (const protocols::RendererKind kind : protocol.renderers)
-    renderers.emplace_back(protocols::to_string(kind));
-  for (const protocols::StimulusSpec& stimulus : protocol.stimuli) stimuli.push_back(stimulus.name);
-  constexpr std::array kOrders = {"in this order", "counterbalanced", "interleaved"};
-  const station::Duration duration = station::duration_of(protocol);
-  const double trial = duration.usual / static_cast<double>(trials.size()) - protocol.home.rest;
-
-  out << protocol.name << (protocol.title.empty() ? "" : ": " + printable(protocol.title)) << "\n"
-      << "  renderers   " << listed(renderers) << " ("
-      << kOrders[static_cast<std::size_t>(protocol.renderer_order)] << ")\n"
-      << "  stimuli     " << listed(stimuli) << "\n"
-      << "  trials      " << counted << " for each participant ("
-      << counted / static_cast<long long>(protocol.renderers.size()) << " with each renderer), "
-      << trials.size() - static_cast<std::size_t>(counted) << " of practice and warm-up besides\n"
-      << "  blocks      " << trials.back().block << ", in " << sessions
-      << (sessions == 1 ? " session\n" : " sessions\n") << "  duration    about "
-      << time_in_words(duration.usual) << " at " << trial << " s a trial, at most "
-      << time_in_words(duration.longest) << "; breaks"
-      << (protocol.practice.criterion ? " and further rounds of practice besides\n" : " besides\n")
-      << heard(protocol) << "  seed        " << protocol.seed << "\n"
-      << "  sha256      " << protocol.sha256 << "\n";
 }
 
 void print_verdict(const std::string& what, const std::vector<std::string>& reasons,
@@ -297,7 +197,7 @@ std::vector<devices::ChainTiming> measured_chains(const std::string& calibration
 
 void print_protocol(const protocols::Protocol& protocol, SceneBuilder builder,
                     const std::vector<devices::ChainTiming>& measured, std::ostream& out) {
-  print_summary(protocol, out);
+  out << study::summary_text(protocol);
   const std::vector<std::string> built_in = protocols::built_in_texts(protocol);
   if (!built_in.empty())
     out << "  texts       built in, in English; a protocol in another language gives its own: "
@@ -318,7 +218,7 @@ void print_protocol(const protocols::Protocol& protocol, SceneBuilder builder,
   for (std::size_t i = 0; i < protocol.group_protocols.size(); ++i) {
     const protocols::Protocol& group = *protocol.group_protocols[i];
     out << "group " << protocol.groups.true_name(i) << "\n";
-    print_task_summary(group, out);
+    out << study::summary_text(group);
     print_fitness(group, StimulusLibrary(group), measured, out);
   }
 }

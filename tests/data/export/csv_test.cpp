@@ -7,6 +7,7 @@
 #include <array>
 #include <charconv>
 
+#include "data/base/checksum.h"
 #include "data/files/text_sink.h"
 #include "data/store/task_text.h"
 #include "tests/data/export/csv_fixture.h"
@@ -58,6 +59,29 @@ TEST_F(ExportCsv, LeftOutTorqueHasItsOwnColumn) {
     const std::string book = contents_of(settings.codebook);
     EXPECT_NE(book.find("trials,torque_driven,,0,\"the device drives force alone"),
               std::string::npos);
+  }
+}
+
+TEST_F(ExportCsv, RowsMissColumnsOfOtherProtocols) {
+  show(a_record(3));
+  const std::string text = R"({"version": 2, "blocks": [{"name": "soft", "task": "detect"}]})";
+  const Participant other =
+      store_.enrol({.name = "felt", .text = text, .sha256 = checksum_hex(text)}, "P2");
+  const palpate::data::Run run = store_.begin_run(other, a_run());
+  TrialRecord record = a_record(1);
+  record.task.task = "detect";
+  record.task.block_name = "soft";
+  store_.begin_attempt(run, record, 1);
+  store_.finish_attempt(run, record);
+  export_csv(store_, out_, false);
+  const Rows all = rows();
+  ASSERT_EQ(all.size(), 3U);
+  for (std::size_t i = 1; i < all.size(); ++i) {
+    const auto row = by_name(all, i);
+    const bool has_task = row.at("participant_id") == "P2";
+    EXPECT_EQ(row.at("task"), has_task ? "detect" : "");
+    EXPECT_EQ(row.at("track"), has_task ? "1" : "");
+    EXPECT_EQ(row.at("catch_trial"), has_task ? "0" : "");
   }
 }
 

@@ -187,6 +187,7 @@ void make_version_1(const std::string& path, const std::string& from) {
 
 TEST_F(Sweeps, ReadsFilesFromBeforeCellsHadColumns) {
   SweepPlan plan = a_sweep_plan();
+  plan.shapes.clear();
   plan.protocol = R"({"version": 2, "renderers": ["ray"], "factors": [
       {"name": "size", "levels": [{"name": "s", "set": {}}, {"name": "l", "set": {}}]}],
       "blocks": [{"name": "b", "task": "rate", "stimuli": ["ball"], "factors": ["size"]}]})";
