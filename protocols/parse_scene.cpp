@@ -186,8 +186,7 @@ void read_file(ObjectReader& reader, const MeshFiles& files, stimuli::ObjectSpec
   } else {
     try {
       stimuli::MeshFileBytes read = stimuli::mesh_file_bytes(path.string());
-      if (files.kept)
-        spec.file_bytes = std::make_shared<const std::string>(std::move(read.bytes));
+      if (files.kept) spec.file_bytes = std::make_shared<const std::string>(std::move(read.bytes));
       spec.files_read = std::move(read.files);
     } catch (const stimuli::MeshError& unreadable) {
       reader.faults().add(reader.pointer("file"), unreadable.what());
