@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
@@ -83,9 +82,9 @@ TriangleSurface triangles_of(const PolygonSoup& soup) {
 /// at some faces and corners of a large mesh: to link all its edges takes a second at a million
 /// faces.
 bool is_plainly_concave(const PolygonSoup& soup) {
-  constexpr std::size_t kLarge = 50'000, kSeen = 1024, kFaces = 16, kCorners = 65'536;
+  constexpr std::size_t kLarge = 50'000, kSeen = 1024, kCorners = 16'384;
   constexpr Index kNone = 0xffffffff;
-  constexpr double kOfSize = 1e-2, kOfTilt = 1000;  // of the size; of what rounding tilts a face by
+  constexpr double kOfSize = 2e-3, kOfTilt = 1000;  // of the size; of what rounding tilts a face by
   if (soup.faces.size() < kLarge || soup.group_names.size() > 1) return false;
   std::vector<PolygonPlane> planes;
   for (std::size_t i = 0; i < kSeen; ++i) {
@@ -100,8 +99,6 @@ bool is_plainly_concave(const PolygonSoup& soup) {
     const double mean = plane.area / plane.diameter;
     return mean > 0 ? mean : 0;  // not a number: there is no such plane
   };
-  std::ranges::sort(planes, std::greater(), width);
-  planes.resize(std::min(planes.size(), kFaces));
   std::vector<Vec3> corners;  // of faces: others do not count
   Vec3 low(std::numeric_limits<double>::max()), high = -low;
   for (std::size_t i = 0; i < soup.faces.size(); i += 1 + soup.faces.size() / kCorners) {
