@@ -16,7 +16,8 @@ struct MeshFiles {
   std::string folder;       ///< on disk
   StoredFiles stored = {};  ///< contents that were stored with a protocol; these are preferred
   OtherFiles others = OtherFiles::read;
-  bool kept = true;  ///< for a record; else they are read again when the object is built
+  /// Whether objects keep the contents, for a record; else building an object reads its file again.
+  bool kept = true;
 };
 
 /// The file that a key names, beside the protocol or stored with it; null and a fault where there

@@ -21,7 +21,7 @@ double squared_gap(const Box& box, const Vec3& from) {
 
 }  // namespace
 
-TriangleTree::TriangleTree(std::vector<CornerTriangle> triangles) {
+TriangleTree::TriangleTree(const std::vector<CornerTriangle>& triangles) {
   std::vector<Box> boxes(triangles.size());
   std::vector<Vec3> middles;
   middles.reserve(triangles.size());

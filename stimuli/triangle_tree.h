@@ -14,7 +14,7 @@ namespace palpate::stimuli {
 
 class TriangleTree {
  public:
-  explicit TriangleTree(std::vector<CornerTriangle> triangles);
+  explicit TriangleTree(const std::vector<CornerTriangle>& triangles);
 
   struct Nearest {
     double distance = std::numeric_limits<double>::infinity();  ///< m

@@ -60,7 +60,7 @@ bool gives_torque(const std::string& renderer) { return !renderer.empty() && ren
 }  // namespace
 
 bool is_storable(const TaskRecord& task) {
-  return task.task == TaskRecord().task || task_text(task).has_value();
+  return task.of_block() || task.task == TaskRecord().task;
 }
 
 std::optional<std::string> task_text(const TaskRecord& task) {

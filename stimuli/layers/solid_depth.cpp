@@ -221,8 +221,7 @@ class ExposedPieces {
 
 SolidDepth::SolidDepth(std::span<const PlacedShell> shells) : all_(corners_of(shells)) {
   slack_ = slack_of(shells, all_);
-  if (auto pieces = ExposedPieces(shells, all_, slack_).find())
-    exposed_.emplace(std::move(*pieces));
+  if (auto pieces = ExposedPieces(shells, all_, slack_).find()) exposed_.emplace(*pieces);
 }
 
 SolidDepth::Depth SolidDepth::at(const Vec3& point, const Known* near) const {
