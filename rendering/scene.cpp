@@ -331,7 +331,6 @@ RenderState Scene::initial_state() const {
     }
     state.unions.pairs.resize(parts_.size() * segments() + kMostPlanes * surfaces_.size());
     state.unions.surfaces.resize(surfaces_.size());
-    for (SurfaceState& surface : state.unions.surfaces) surface.patches.reserve(kMostPatches);
     state.unions.groups.resize(groups_.size());
     state.unions.objects.resize(object_states_);
     state.unions.breaking.resize(breaking_.size());

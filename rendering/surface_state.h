@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "rendering/active_planes.h"
+#include "rendering/near_patches.h"
 #include "rendering/surface_patch.h"
 #include "stimuli/vec.h"
 
@@ -43,18 +44,12 @@ struct PlacedSurface {
   }
 };
 
-/// A patch near the tool.
-struct NearPatch {
-  PatchPlane plane;  ///< for the tool where it was listed; without a normal: not known
-  SurfacePatch patch;
-};
-
 /// A surface's state between ticks. Local frame, m.
 struct SurfaceState {
   std::array<SurfacePatch, kMostPlanes> carrying;  ///< held the ideal tool at the last tick
   std::size_t carrying_count = 0;
   /// All that the tool can touch while it is less than `room`, m, off the straight way.
-  std::vector<NearPatch> patches;
+  NearPatches patches;
   PosedTool listed;  ///< where the way begins
   Vec3 listed_way;
   double room = 0;
@@ -72,8 +67,5 @@ struct SurfaceState {
   };
   std::array<Rubbed, kMostPlanes> rubbed;
 };
-
-/// The longest list of patches; where there are more, each motion queries the tree.
-inline constexpr std::size_t kMostPatches = 512;
 
 }  // namespace palpate::rendering

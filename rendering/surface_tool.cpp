@@ -97,8 +97,8 @@ void SurfaceTool::list_triangle(std::uint32_t index, std::uint8_t what, std::uin
   const double own = glm::dot(t.normal, along);
   const auto add_face = [&](bool tail) {
     const Vec3 end = own_.listed.segments[segment].end(tail);
-    own_.patches.push_back({{t.normal, t.offset - glm::dot(t.normal, end)},
-                            {index << 2, segment, tail, SurfacePatch::Kind::face}});
+    own_.patches.add({index << 2, segment, tail, SurfacePatch::Kind::face},
+                     {t.normal, t.offset - glm::dot(t.normal, end)});
   };
   if ((what & stimuli::surface_pair::kTip) != 0 && own >= -level) add_face(false);
   if (!(length2 > 0)) return;
@@ -111,14 +111,15 @@ void SurfaceTool::list_triangle(std::uint32_t index, std::uint8_t what, std::uin
     const double other = glm::dot(beyond.normal, along);
     if (std::min(own, other) > level || std::max(own, other) < -level) continue;
     const SurfacePatch patch{index << 2 | k, segment, false, SurfacePatch::Kind::edge};
-    own_.patches.push_back({plane_of(surface_, patch, own_.listed), patch});
+    PatchPlane plane = rendering::plane_of(surface_, patch, own_.listed);
     // Rounding may turn the normal of an edge that lies almost along the segment, or reverse that
     // of one between triangles that do.
     const Vec3 e = surface_.vertices()[t.corners[(k + 1) % 3]] - surface_.vertices()[t.corners[k]];
     const Vec3 across = glm::cross(e, along);
     if ((own >= 0) == (other >= 0) ||
         glm::dot(across, across) < kAlmostAlong * kAlmostAlong * glm::dot(e, e) * length2)
-      own_.patches.back().plane = {};
+      plane = {};
+    own_.patches.add(patch, plane);
   }
 }
 
@@ -213,16 +214,11 @@ double SurfaceTool::cast_on_list(const Vec3& from, const Vec3& to, double done,
                                  PatchHit& first) const {
   const Vec3 start = from + moved_, end = to + moved_, way = to - from;
   const double error = kListed * tolerance_;
-  for (const NearPatch& near : own_.patches) {
-    const double above = glm::dot(near.plane.normal, start) - near.plane.depth,
-                 under = near.plane.depth - glm::dot(near.plane.normal, end);
-    if (under < -error || above < -error) continue;
-    // Later than the first so far.
-    if (above - error > first.time * (above + under + 2 * error)) continue;
-    if (!exists(surface_, near.patch, turned_)) continue;
-    cast_on_patch(surface_, near.patch, rendering::plane_of(surface_, near.patch, turned_), turned_,
-                  from, to, tolerance_, border(), first);
-  }
+  own_.patches.for_each_entered(start, end, error, first, [&](const SurfacePatch& patch) {
+    if (!exists(surface_, patch, turned_)) return;
+    cast_on_patch(surface_, patch, rendering::plane_of(surface_, patch, turned_), turned_, from, to,
+                  tolerance_, border(), first);
+  });
   // The list is for a convex region.
   if (in_room(to)) return 1;
   const double length = glm::length(way);
@@ -406,15 +402,11 @@ bool SurfaceTool::in_the_way_at_rest(SurfacePlane& out) {
     out = {patch, plane.normal, plane.depth};
   };
   if (in_room(exact_)) {
-    const Vec3 rest = exact_ + moved_, now = at_ + moved_;
-    for (const NearPatch& near : own_.patches) {
-      const Vec3& normal = near.plane.normal;
-      if (glm::dot(normal, rest) - near.plane.depth > kListed * tolerance_ ||
-          glm::dot(normal, now) - near.plane.depth < -kListed * tolerance_ ||
-          !exists(surface_, near.patch, turned_))
-        continue;
-      look(near.patch, rendering::plane_of(surface_, near.patch, turned_));
-    }
+    own_.patches.for_each_entered(at_ + moved_, exact_ + moved_, kListed * tolerance_, {},
+                                  [&](const SurfacePatch& patch) {
+                                    if (exists(surface_, patch, turned_))
+                                      look(patch, rendering::plane_of(surface_, patch, turned_));
+                                  });
     return found;
   }
   for (std::size_t j = 0; j < turned_.count; ++j) {
