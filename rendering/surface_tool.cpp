@@ -91,15 +91,16 @@ double most_turned(const PosedTool& from, const PosedTool& to) {
 /// Lists the patches of a triangle that the listed tool can touch, or could if it were turned by
 /// rounding. \param what  bits of surface_pair
 void SurfaceTool::list_triangle(std::uint32_t index, std::uint8_t what, std::uint8_t segment) {
-  const Vec3& along = own_.listed.segments[segment].along;
-  const double length2 = glm::dot(along, along), level = kLevelAlong * std::sqrt(length2);
   const stimuli::SurfaceTriangle& t = surface_.triangles()[index];
-  const double own = glm::dot(t.normal, along);
   const auto add_face = [&](bool tail) {
     const Vec3 end = own_.listed.segments[segment].end(tail);
     own_.patches.add({index << 2, segment, tail, SurfacePatch::Kind::face},
                      {t.normal, t.offset - glm::dot(t.normal, end)});
   };
+  if (!tick_.sides) return add_face(false);
+  const Vec3& along = own_.listed.segments[segment].along;
+  const double length2 = glm::dot(along, along), level = kLevelAlong * std::sqrt(length2);
+  const double own = glm::dot(t.normal, along);
   if ((what & stimuli::surface_pair::kTip) != 0 && own >= -level) add_face(false);
   if (!(length2 > 0)) return;
   if ((what & stimuli::surface_pair::kTail) != 0 && own <= level) add_face(true);
@@ -171,6 +172,8 @@ void SurfaceTool::list_about(const Vec3& at, const Vec3& way, double aside) {
 
 /// Whether the tool has its orientation in the list.
 bool SurfaceTool::same_turn() const {
+  // A tip does not turn.
+  if (!tick_.sides) return own_.listed.segments[0].along == Vec3(0);
   const Vec3 moved = from_list();
   const double same = kSameTurn * tolerance_, same2 = same * same;
   for (std::size_t j = 0; j < turned_.count; ++j) {
@@ -215,7 +218,7 @@ double SurfaceTool::cast_on_list(const Vec3& from, const Vec3& to, double done,
   const Vec3 start = from + moved_, end = to + moved_, way = to - from;
   const double error = kListed * tolerance_;
   own_.patches.for_each_entered(start, end, error, first, [&](const SurfacePatch& patch) {
-    if (!exists(surface_, patch, turned_)) return;
+    if (tick_.sides && !exists(surface_, patch, turned_)) return;
     cast_on_patch(surface_, patch, rendering::plane_of(surface_, patch, turned_), turned_, from, to,
                   tolerance_, border(), first);
   });
@@ -572,12 +575,18 @@ PatchHit SurfaceTool::sweep(const PosedTool& from, const PosedTool& to, const Ve
 /// allows.
 /// \param most  largest fraction to try \return fraction taken, 0 to 1
 double SurfaceTool::turn(const ToolPose& from, double most) {
-  const PosedTool before = pose(from);
   const PosedTool whole = pose(target_);
-  const Vec3 shift =
-      placed_.local_vector(turned(memory_.grasp, from) - turned(memory_.grasp, target_));
   const Vec3 apart = placed_.local_vector(from.tip - target_.tip);
   planes_.clear();
+  if (!tick_.sides) {  // a tip does not turn
+    pose_ = target_;
+    turned_ = whole;
+    at_ = apart;
+    return 0;
+  }
+  const PosedTool before = pose(from);
+  const Vec3 shift =
+      placed_.local_vector(turned(memory_.grasp, from) - turned(memory_.grasp, target_));
   // Turn about the grasp, from the last place.
   const double motion = most_moved(before, whole, apart + shift);
   if (motion <= kExact * skin_) {

@@ -60,12 +60,6 @@ Mat3 tool_frame(const Vec3& d, const Mat3* before, const Vec3& measured) {
   return {side, glm::cross(axis, side), axis};
 }
 
-PlacedSegment place_segment(const Tool* tool, bool sides, const ToolPose& pose, std::size_t index) {
-  if (tool == nullptr || !sides) return {Vec3(0), sides ? pose.d : Vec3(0)};
-  const ToolSegment& segment = tool->segments[index];
-  return {pose.frame * segment.from, pose.frame * (segment.to - segment.from)};
-}
-
 PlacedTool place(const Tool* tool, bool sides, const ToolPose& pose) {
   PlacedTool out;
   place(tool, sides, pose, out);

@@ -59,7 +59,12 @@ PlacedTool place(const Tool* tool, bool sides, const ToolPose& pose);
 void place(const Tool* tool, bool sides, const ToolPose& pose, PlacedTool& out);
 
 /// One of the segments.
-PlacedSegment place_segment(const Tool* tool, bool sides, const ToolPose& pose, std::size_t index);
+inline PlacedSegment place_segment(const Tool* tool, bool sides, const ToolPose& pose,
+                                   std::size_t index) {
+  if (tool == nullptr || !sides) return {Vec3(0), sides ? pose.d : Vec3(0)};
+  const ToolSegment& segment = tool->segments[index];
+  return {pose.frame * segment.from, pose.frame * (segment.to - segment.from)};
+}
 
 /// A pose between two: the tip moves linearly; the stylus, with the tool if there is one, turns
 /// about one axis. Its length changes linearly.
