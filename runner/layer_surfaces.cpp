@@ -42,9 +42,9 @@ const LayerSurfaces::Made& LayerSurfaces::make(const std::vector<LayeredShape>& 
   const stimuli::SolidDepth* const within = part ? &*part : nullptr;
   stimuli::LayerSurface layer = stimuli::layer_surface(solid, wanted.layer.depth, within);
   Made made;
-  if (layer.surface.triangles.empty()) {
+  if (layer.surface.triangles.empty() || layer.error > wanted.layer.depth)
     made.deepest = stimuli::deepest_layer(solid, within);
-  } else {
+  if (!layer.surface.triangles.empty()) {
     made.error = layer.error;
     made.surface = std::make_shared<const stimuli::ClosedSurface>(std::move(layer.surface));
   }

@@ -34,7 +34,7 @@ class LayerSurfaces {
   struct Made {
     std::shared_ptr<const stimuli::ClosedSurface> surface;  ///< null: nothing is left
     double error = 0;                                       ///< m, of its depth
-    double deepest = 0;  ///< m; where nothing is left, here something is
+    double deepest = 0;  ///< m; if nothing is left, or too thin a layer: here something is
   };
   /// \param all  shapes of the solid: what lies between two of them is no surface
   /// \throws MeshError  if it is no closed surface

@@ -150,6 +150,19 @@ bool has_layers(const stimuli::ObjectSpec& spec) {
   return std::any_of(spec.parts.begin(), spec.parts.end(), has_layers);
 }
 
+/// Of a layer that is less deep than the error of its depth. One at twice that error is wrong by
+/// about half of its depth, if so much of the object is left.
+std::string too_thin(int number, const stimuli::Layer& layer, const LayerSurfaces::Made& made) {
+  char text[240], expected[80] = "a thicker object, or none so thin";
+  if (2 * made.error < made.deepest)
+    std::snprintf(expected, sizeof expected, "at least %.2g m", 2 * made.error);
+  std::snprintf(text, sizeof text,
+                "/layers/%d/depth_m: where the surface is concave, the depth of this layer, %g m, "
+                "would be wrong by up to %.2g m; expected %s",
+                number - 1, layer.depth, made.error, expected);
+  return text;
+}
+
 }  // namespace
 
 std::vector<rendering::ObjectEffects> effects_of(const std::vector<stimuli::ObjectSpec>& objects) {
@@ -329,6 +342,7 @@ bool SceneBuilder::place_layer_surface(int object, const std::vector<PlacedShape
   }
   deepest = std::max(deepest, made->deepest);
   if (made->surface == nullptr) return false;
+  if (made->error > layer.depth) throw stimuli::MeshError({too_thin(number, layer, *made)});
   placing.surfaces.add(wanted, object, made->surface);
   char text[160];
   std::snprintf(
@@ -367,7 +381,12 @@ void SceneBuilder::place_layers(int object, Placing& placing) {
       } catch (const stimuli::MeshError&) {
         by_surface = true;  // where several concave edges meet, parts are not deep enough
       }
-      if (by_surface) here = place_layer_surface(object, same, layer, number, placing, deepest);
+      try {
+        if (by_surface) here = place_layer_surface(object, same, layer, number, placing, deepest);
+      } catch (const stimuli::MeshError& error) {
+        faults.insert(faults.end(), error.faults().begin(), error.faults().end());
+        here = true;
+      }
       is_left |= here;
     }
     if (is_left) continue;

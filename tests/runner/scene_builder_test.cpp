@@ -300,9 +300,8 @@ TEST(SceneBuilder, BodyMassCountsAllParts) {
   }
 }
 
-TEST(SceneBuilder, LumpWithoutConvexPartsFallsOnWhatStands) {
-  const palpate::testing::TemporaryFolder folder;
-  const std::string file = folder / "lump.obj";
+/// A ball with a rough surface, as a file.
+stimuli::ObjectSpec lump_of(const std::string& file, const stimuli::Material& material) {
   stimuli::PolygonSoup soup = stimuli::icosphere(0.02, 3);
   Random random(7);
   {
@@ -318,7 +317,37 @@ TEST(SceneBuilder, LumpWithoutConvexPartsFallsOnWhatStands) {
   stimuli::ObjectSpec lump;
   lump.shape = stimuli::ShapeKind::mesh;
   lump.file = file;
-  lump.material = of(800, {});
+  lump.material = material;
+  return lump;
+}
+
+TEST(SceneBuilder, ThinLayerNamesADepthThatWorks) {
+  const palpate::testing::TemporaryFolder folder;
+  stimuli::ObjectSpec lump =
+      lump_of(folder / "lump.obj", of(800, {{1e-6, 500, 0, {}}, {2e-6, 500, 0, {}}}));
+  std::vector<std::string> faults;
+  try {
+    SceneBuilder().build({lump}, true);
+  } catch (const stimuli::MeshError& error) {
+    faults = error.faults();
+  }
+  ASSERT_EQ(faults.size(), 2u);
+  EXPECT_NE(faults[1].find("/layers/1/depth_m: where the surface is concave"), std::string::npos)
+      << faults[1];
+  const std::string& fault = faults[0];
+  EXPECT_NE(fault.find("/layers/0/depth_m: where the surface is concave"), std::string::npos)
+      << fault;
+  const std::string expected = "; expected at least ";
+  const std::size_t at = fault.find(expected);
+  ASSERT_NE(at, std::string::npos) << fault;
+  lump.material.layers.resize(1);
+  lump.material.layers[0].depth = std::stod(fault.substr(at + expected.size()));
+  EXPECT_NO_THROW(SceneBuilder().build({lump}, true)) << fault;
+}
+
+TEST(SceneBuilder, LumpWithoutConvexPartsFallsOnWhatStands) {
+  const palpate::testing::TemporaryFolder folder;
+  stimuli::ObjectSpec lump = lump_of(folder / "lump.obj", of(800, {}));
   stimuli::ObjectSpec other = lump;
   lump.pose.position = {0.002, 0, 0.06};
   lump.body = stimuli::Body{.mass = 0.05};
