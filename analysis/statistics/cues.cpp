@@ -338,7 +338,7 @@ std::vector<CueModelSum> sums_of(const std::vector<CueParticipant>& participants
   return out;
 }
 
-CueTest test_of(const std::vector<double>& differences) {
+CueTest cue_test_of(const std::vector<double>& differences) {
   CueTest out;
   if (differences.empty()) {
     out.test.undefined = "no participant has figures";
@@ -474,9 +474,9 @@ CueAnalysis analyze_all_cues(const std::vector<CueAnswers>& answers, const CueSe
     out.participants.push_back(std::move(one));
   }
   out.models = sums_of(out.participants);
-  out.weight = test_of(weight);
-  out.jnd_predicted = test_of(predicted);
-  out.jnd_better = test_of(better);
+  out.weight = cue_test_of(weight);
+  out.jnd_predicted = cue_test_of(predicted);
+  out.jnd_better = cue_test_of(better);
   return out;
 }
 

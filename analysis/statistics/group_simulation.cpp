@@ -4,6 +4,7 @@
 #include <map>
 #include <utility>
 
+#include "analysis/statistics/evenly.h"
 #include "analysis/statistics/group_psychometric.h"
 #include "analysis/statistics/jobs.h"
 #include "data/base/random.h"
@@ -13,13 +14,6 @@ namespace palpate::analysis {
 namespace {
 
 constexpr double kLn3 = 1.0986122886681098;
-
-std::vector<double> evenly(double low, double high, int count) {
-  std::vector<double> values(static_cast<std::size_t>(count));
-  for (int i = 0; i < count; ++i)
-    values[static_cast<std::size_t>(i)] = low + (high - low) * i / (count - 1);
-  return values;
-}
 
 /// Levels on both sides of a standard of 300, JND 30, PSEs with an SD of half a JND.
 GroupStudy two_sided(std::string name, std::size_t participants, int trials, double lapse) {

@@ -5,6 +5,7 @@
 #include <limits>
 #include <utility>
 
+#include "analysis/statistics/evenly.h"
 #include "analysis/statistics/jobs.h"
 #include "analysis/statistics/psychometric_fit.h"
 #include "analysis/statistics/sensitivity.h"
@@ -16,13 +17,6 @@ namespace {
 
 using protocols::ParameterGrid;
 using protocols::ProcedureSpec;
-
-std::vector<double> evenly(double low, double high, int count) {
-  std::vector<double> values(static_cast<std::size_t>(count));
-  for (int i = 0; i < count; ++i)
-    values[static_cast<std::size_t>(i)] = low + (high - low) * i / (count - 1);
-  return values;
-}
 
 protocols::Staircase staircase(double start, double low, double high, std::vector<double> steps,
                                int up, int down) {

@@ -13,7 +13,7 @@ namespace palpate::analysis {
 
 namespace {
 
-constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 /// "Cone 22 %, cube 11 %, no difference for sphere and cylinder", without its sizes.
 constexpr const char* kPaperPattern =
     "cone > 5 && cube > 5 && min(cone, cube) > max(sphere, cylinder)";
@@ -76,7 +76,7 @@ Spread spread_of(const std::vector<double>& values, const std::vector<double>& e
 /// All values in the order of Saltelli's samples, with gaps for points not on record.
 std::vector<double> all_samples(const SweepTable& table, const std::vector<double>& values) {
   if (values.empty()) return {};
-  std::vector<double> out(static_cast<std::size_t>(table.points.back()), kNone);
+  std::vector<double> out(static_cast<std::size_t>(table.points.back()), kUnknown);
   for (std::size_t row = 0; row < table.rows(); ++row)
     out[static_cast<std::size_t>(table.points[row]) - 1] = values[row];
   return out;
@@ -150,7 +150,7 @@ PatternShare pattern_share(const SweepTable& table, const std::string& expressio
     std::optional<bool> holds;
     if (!table.failed[row])
       holds = pattern.holds([&](std::size_t column) { return table.values[column][row]; });
-    out.at.push_back(holds ? (*holds ? 1 : 0) : kNone);
+    out.at.push_back(holds ? (*holds ? 1 : 0) : kUnknown);
     if (!independent_setting(table, row)) continue;
     out.undefined += holds ? 0 : 1;
     out.n += holds ? 1 : 0;
