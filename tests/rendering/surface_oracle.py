@@ -179,16 +179,19 @@ class Judge:
         return out
 
     def portions(self, near, flat, p, q):
-        """The ends of what lies over triangles, one after the other from `near` on, within one degree of the segment."""
-        found, seen, left = [], set(near), list(near)
+        """The outermost ends of what lies over triangles, one after the other from `near` on, within one degree of the segment."""
+        found, seen, left, known = [], set(near), list(near), {}
         while left:
             t = left.pop()
-            over = self.portion(t, p, q)
+            if t not in known:
+                plane, over = self.portion(t, p, q)
+                known.update(dict.fromkeys(plane, over))
+            over = known[t]
             found += over
             if over:
                 left += [s for s in self.s.beyond[t] if flat[s] and s not in seen]
                 seen.update(self.s.beyond[t])
-        return found
+        return [min(found), max(found)] if found else []  # all between are sums of these
 
     def at_ends(self, p, q, slope, is_point):
         """Facets that an end touches: the end that points into the facet; both where the segment lies along it."""
@@ -221,7 +224,7 @@ class Judge:
         return out
 
     def portion(self, t, p, q):
-        """The ends of what lies over the triangles in t's plane."""
+        """The triangles in t's plane, and the outermost ends of what lies over them."""
         s = self.s
         plane = np.flatnonzero((s.n @ s.n[t] > 1 - 1e-8) & (np.abs((s.a - s.a[t]) @ s.n[t]) < self.tolerance))
         low, high = np.zeros(len(plane)), np.ones(len(plane))
@@ -231,7 +234,8 @@ class Judge:
             high[(hp < 0) & (hq < 0)] = -1
             low = np.where((hp < 0) & (hq >= 0), np.maximum(low, cut), low)
             high = np.where((hp >= 0) & (hq < 0), np.minimum(high, cut), high)
-        return np.stack([low, high], 1)[low <= high].ravel().tolist()
+        over = low <= high
+        return plane.tolist(), [low[over].min(), high[over].max()] if over.any() else []
 
     def pushed(self, segments, tip, force, torque):
         """What is wrong with force and torque, or nothing."""
