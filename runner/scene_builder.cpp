@@ -153,7 +153,7 @@ bool has_layers(const stimuli::ObjectSpec& spec) {
 /// Of a layer that is less deep than the error of its depth. One at twice that error is wrong by
 /// about half of its depth, if so much of the object is left.
 std::string too_thin(int number, const stimuli::Layer& layer, const LayerSurfaces::Made& made) {
-  char text[240], expected[80] = "a thicker object, or none so thin";
+  char text[240], expected[80] = "a deeper layer or a thicker object";
   if (2 * made.error < made.deepest)
     std::snprintf(expected, sizeof expected, "at least %.2g m", 2 * made.error);
   std::snprintf(text, sizeof text,

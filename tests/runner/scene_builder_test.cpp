@@ -259,12 +259,16 @@ TEST(SceneBuilder, StatesTheGreatestDepthOfACompoundsLayers) {
   }
 }
 
-/// An L of two bars, as a file.
-stimuli::ObjectSpec angle(const std::string& file, const stimuli::Material& material) {
-  std::ofstream(file) << "v 0 0 0\nv .06 0 0\nv .06 .02 0\nv .02 .02 0\nv .02 .06 0\nv 0 .06 0\n"
-                         "v 0 0 .03\nv .06 0 .03\nv .06 .02 .03\nv .02 .02 .03\nv .02 .06 .03\n"
-                         "v 0 .06 .03\nf 6 5 4 3 2 1\nf 7 8 9 10 11 12\nf 1 2 8 7\nf 2 3 9 8\n"
-                         "f 3 4 10 9\nf 4 5 11 10\nf 5 6 12 11\nf 6 1 7 12\n";
+/// An L of two bars, as a file. \param bar  m, how thick they are
+stimuli::ObjectSpec angle(const std::string& file, const stimuli::Material& material,
+                          double bar = 0.02) {
+  std::ofstream out(file);
+  for (const double z : {0.0, 0.03}) {
+    out << "v 0 0 " << z << "\nv .06 0 " << z << "\nv .06 " << bar << ' ' << z << "\nv " << bar
+        << ' ' << bar << ' ' << z << "\nv " << bar << " .06 " << z << "\nv 0 .06 " << z << '\n';
+  }
+  out << "f 6 5 4 3 2 1\nf 7 8 9 10 11 12\nf 1 2 8 7\nf 2 3 9 8\nf 3 4 10 9\nf 4 5 11 10\n"
+         "f 5 6 12 11\nf 6 1 7 12\n";
   stimuli::ObjectSpec spec;
   spec.shape = stimuli::ShapeKind::mesh;
   spec.file = file;
@@ -343,6 +347,20 @@ TEST(SceneBuilder, ThinLayerNamesADepthThatWorks) {
   lump.material.layers.resize(1);
   lump.material.layers[0].depth = std::stod(fault.substr(at + expected.size()));
   EXPECT_NO_THROW(SceneBuilder().build({lump}, true)) << fault;
+}
+
+TEST(SceneBuilder, ThinLayerOfASheetNamesNoDepth) {
+  const palpate::testing::TemporaryFolder folder;
+  const stimuli::ObjectSpec sheet =
+      angle(folder / "sheet.obj", of(800, {{1e-6, 500, 0, {}}}), 0.0003);
+  std::string fault;
+  try {
+    SceneBuilder().build({sheet}, true);
+  } catch (const stimuli::MeshError& error) {
+    fault = error.faults().front();
+  }
+  EXPECT_NE(fault.find("; expected a deeper layer or a thicker object"), std::string::npos)
+      << fault;
 }
 
 TEST(SceneBuilder, LumpWithoutConvexPartsFallsOnWhatStands) {
