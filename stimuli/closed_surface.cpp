@@ -9,6 +9,7 @@
 #include <glm/geometric.hpp>
 #include <limits>
 #include <numeric>
+#include <optional>
 #include <utility>
 
 #include "stimuli/face_triangles.h"
@@ -64,13 +65,13 @@ class Cleaner {
     take_faces();
     drop_fins();
     balance();
-    link_triangles(points_, triangles_, across_);
+    link();
     const Flattened flat =
         collapse_flat_triangles(points_, triangles_, across_, kFlatErrors * error_);
     if (flat.triangles > 0) {
       drop_gone();
       drop_fins();
-      link_triangles(points_, triangles_, across_);
+      link();
     }
     note(dropped_ + flat.triangles, "triangle without area left out, its neighbours joined",
          "triangles without area left out, their neighbours joined");
@@ -255,27 +256,25 @@ class Cleaner {
   void drop_fins() {
     std::vector<char> gone(triangles_.size(), 0);
     std::vector<std::pair<Triangle, Index>> sorted;  // with the corners of another
-    {
-      const SideGroups sides(points_.size(), triangles_);
-      sides.for_each_edge([&](const SideGroups::Edge& edge) {
-        if (edge.sides.size() < 3) return;
-        for (const SideGroups::Side& side : edge.sides) {
-          Triangle key = triangles_[side.triangle()];
-          std::sort(key.begin(), key.end());
-          sorted.emplace_back(key, side.triangle());
-        }
-      });
-      // Back to back along a whole edge that no other triangle has.
-      sides.for_each_edge([&](const SideGroups::Edge& edge) {
-        if (edge.sides.size() != 2) return;
-        Triangle a = triangles_[edge.sides[0].triangle()], b = triangles_[edge.sides[1].triangle()];
-        std::sort(a.begin(), a.end());
-        std::sort(b.begin(), b.end());
-        if (a != b) return;
-        sorted.emplace_back(a, edge.sides[0].triangle());
-        sorted.emplace_back(a, edge.sides[1].triangle());
-      });
-    }
+    sides_.emplace(points_.size(), triangles_);
+    sides_->for_each_edge([&](const SideGroups::Edge& edge) {
+      if (edge.sides.size() < 3) return;
+      for (const SideGroups::Side& side : edge.sides) {
+        Triangle key = triangles_[side.triangle()];
+        std::sort(key.begin(), key.end());
+        sorted.emplace_back(key, side.triangle());
+      }
+    });
+    // Back to back along a whole edge that no other triangle has.
+    sides_->for_each_edge([&](const SideGroups::Edge& edge) {
+      if (edge.sides.size() != 2) return;
+      Triangle a = triangles_[edge.sides[0].triangle()], b = triangles_[edge.sides[1].triangle()];
+      std::sort(a.begin(), a.end());
+      std::sort(b.begin(), b.end());
+      if (a != b) return;
+      sorted.emplace_back(a, edge.sides[0].triangle());
+      sorted.emplace_back(a, edge.sides[1].triangle());
+    });
     std::sort(sorted.begin(), sorted.end());
     sorted.erase(std::unique(sorted.begin(), sorted.end()), sorted.end());
     std::size_t fins = 0;
@@ -300,6 +299,7 @@ class Cleaner {
   }
 
   void drop(const std::vector<char>& gone) {
+    sides_.reset();
     std::size_t kept = 0;
     for (std::size_t t = 0; t < triangles_.size(); ++t) {
       if (gone[t] != 0) continue;
@@ -308,6 +308,12 @@ class Cleaner {
     }
     triangles_.resize(kept);
     face_.resize(kept);
+  }
+
+  void link() {
+    if (!sides_) sides_.emplace(points_.size(), triangles_);
+    link_triangles(points_, triangles_, *sides_, across_);
+    sides_.reset();
   }
 
   void drop_gone() {
@@ -327,11 +333,16 @@ class Cleaner {
 
   Unbalanced unbalanced() const {
     Unbalanced found;
-    SideGroups(points_.size(), triangles_).for_each_edge([&](const SideGroups::Edge& edge) {
+    const auto look = [&](const SideGroups::Edge& edge) {
       if (2 * ups(edge) == edge.sides.size()) return;
       ++(edge.sides.size() == 1 ? found.open : found.other);
       if (edge.sides.size() == 1) found.sides.push_back(edge.sides[0]);
-    });
+    };
+    if (sides_) {
+      sides_->for_each_edge(look);
+    } else {
+      SideGroups(points_.size(), triangles_).for_each_edge(look);
+    }
     return found;
   }
 
@@ -351,6 +362,7 @@ class Cleaner {
   void balance() {
     Unbalanced found = unbalanced();
     if (found.open + found.other == 0) return;
+    sides_.reset();  // triangles change
     const std::vector<Triangle> triangles = triangles_;
     const std::vector<Index> faces = face_;
     const std::vector<std::string> notes = notes_;
@@ -583,7 +595,8 @@ class Cleaner {
   std::vector<Vec3> points_;
   std::vector<Index> vertex_;  // the soup's number of each point
   std::vector<Triangle> triangles_, across_;
-  std::vector<Index> face_;  // the soup's number of each triangle's face
+  std::optional<SideGroups> sides_;  // of the triangles as they are now
+  std::vector<Index> face_;          // the soup's number of each triangle's face
   std::vector<BentFace> bent_;
   std::size_t dropped_ = 0;
   double size_ = 0;   // m, diagonal of the bounding box

@@ -92,10 +92,10 @@ SideGroups::SideGroups(std::size_t vertex_count, const std::vector<std::array<In
 }
 
 void link_triangles(const std::vector<Vec3>& vertices,
-                    const std::vector<std::array<Index, 3>>& triangles,
+                    const std::vector<std::array<Index, 3>>& triangles, const SideGroups& sides,
                     std::vector<std::array<Index, 3>>& across) {
   across.assign(triangles.size(), {});
-  SideGroups(vertices.size(), triangles).for_each_edge([&](const SideGroups::Edge& edge) {
+  sides.for_each_edge([&](const SideGroups::Edge& edge) {
     if (edge.sides.size() > 2) {
       link_fan(vertices, triangles, edge, across);
       return;

@@ -50,8 +50,9 @@ class SideGroups {
 
 /// The neighbour over each side. Along every edge as many triangles must run one way as the other.
 /// Where there are more than two, each two neighbours have solid between them.
+/// \param sides  of the same triangles
 void link_triangles(const std::vector<Vec3>& vertices,
                     const std::vector<std::array<std::uint32_t, 3>>& triangles,
-                    std::vector<std::array<std::uint32_t, 3>>& across);
+                    const SideGroups& sides, std::vector<std::array<std::uint32_t, 3>>& across);
 
 }  // namespace palpate::stimuli

@@ -78,10 +78,14 @@ class Tree {
           (surface.vertices[c[0]] + surface.vertices[c[1]] + surface.vertices[c[2]]) / 3.0;
       keys[t] = {morton((middle - all.low) / size), t};
     }
-    std::sort(keys.begin(), keys.end(), [&](const Key& a, const Key& b) {
-      const Index of_a = shell[a.second], of_b = shell[b.second];
-      return of_a != of_b ? of_a < of_b : a < b;
-    });
+    if (std::ranges::all_of(shell, [&](Index one) { return one == shell[0]; })) {
+      std::sort(keys.begin(), keys.end());
+    } else {
+      std::sort(keys.begin(), keys.end(), [&](const Key& a, const Key& b) {
+        const Index of_a = shell[a.second], of_b = shell[b.second];
+        return of_a != of_b ? of_a < of_b : a < b;
+      });
+    }
     order_.reserve(keys.size());
     for (const auto& [key, t] : keys) order_.push_back(t);
     nodes_.reserve(keys.size());
@@ -89,6 +93,7 @@ class Tree {
   }
 
   const std::vector<Node>& nodes() const { return nodes_; }
+  static constexpr Index kLeaf = 10;  ///< triangles of a leaf at most
   Index triangle(Index i) const { return order_[i]; }
   Box box(Index t) const {
     Box box;
@@ -122,7 +127,6 @@ class Tree {
 
  private:
   using Key = std::pair<std::uint64_t, Index>;
-  static constexpr Index kLeaf = 10;
 
   Index face_of(Index t) const {
     return surface_.flat_face.empty() ? kNoFlatFace : surface_.flat_face[t];
@@ -535,6 +539,7 @@ class WindingCheck {
 
   void find_crossings() {
     crossed_.assign(surface_.triangles.size(), 0);
+    leaves_.assign(kLeaves, {});
     budget_ = 64 * surface_.triangles.size() + 100'000'000;
     cross(0, 0);
     if (budget_ == 0 && !in_shells_) {
@@ -545,6 +550,38 @@ class WindingCheck {
     }
   }
 
+  /// A triangle of a leaf, looked up once for all that it is compared with.
+  struct Facet {
+    Index t = 0;
+    Triangle corners{};
+    std::array<Vec3, 3> at;  ///< m
+    Vec3 area;               ///< m^2, twice
+    Box box;
+  };
+  struct Leaf {
+    Index node = 0;  ///< 0: none; the root is a leaf of the smallest surfaces alone
+    std::array<Facet, Tree::kLeaf> facets{};
+  };
+
+  const Leaf& leaf_of(Index node) {
+    Leaf& leaf = leaves_[node % leaves_.size()];
+    if (leaf.node == node && node != 0) return leaf;
+    leaf.node = node;
+    const Tree::Node& from = tree_->nodes()[node];
+    for (Index i = from.begin; i < from.end; ++i) {
+      Facet& facet = leaf.facets[i - from.begin];
+      facet.t = tree_->triangle(i);
+      facet.corners = surface_.triangles[facet.t];
+      facet.box = Box();
+      for (std::size_t k = 0; k < 3; ++k) {
+        facet.at[k] = surface_.vertices[facet.corners[k]];
+        facet.box.add(facet.at[k]);
+      }
+      facet.area = glm::cross(facet.at[1] - facet.at[0], facet.at[2] - facet.at[0]);
+    }
+    return leaf;
+  }
+
   void cross(Index a, Index b) {
     if (budget_ == 0) return;
     const Tree::Node &x = tree_->nodes()[a], &y = tree_->nodes()[b];
@@ -552,11 +589,18 @@ class WindingCheck {
     // Where a plane face lies on itself, its border does, and the triangles beyond the border are
     // found there. Long triangles of a polygon with many corners all have boxes that meet.
     if (x.face == y.face && x.face != kNoFlatFace) return;
-    if (a != b && (!x.box.meets(y.box) || is_apart(x, y.box) || is_apart(y, x.box))) return;
+    if (a != b) {
+      if (!x.box.meets(y.box)) return;
+      if (x.right == 0 && is_apart(leaf_of(a), x, y.box)) return;
+      if (y.right == 0 && is_apart(leaf_of(b), y, x.box)) return;
+    }
     if (x.right == 0 && y.right == 0) {
-      for (Index i = x.begin; i < x.end; ++i) {
-        for (Index k = a == b ? i + 1 : y.begin; k < y.end; ++k)
-          cross_pair(tree_->triangle(i), tree_->triangle(k));
+      const Leaf of_x = leaf_of(a);  // the other one may take its place
+      const Leaf& of_y = leaf_of(b);
+      const Index count_x = x.end - x.begin, count_y = y.end - y.begin;
+      for (Index i = 0; i < count_x; ++i) {
+        for (Index k = a == b ? i + 1 : 0; k < count_y; ++k)
+          cross_pair(of_x.facets[i], of_y.facets[k]);
       }
     } else if (a == b) {
       cross(a + 1, a + 1);
@@ -574,38 +618,59 @@ class WindingCheck {
   }
 
   // Whether each triangle of a leaf is apart from the box: of a long one, much of its own box is.
-  bool is_apart(const Tree::Node& leaf, const SmallBox& box) const {
-    if (leaf.right != 0) return false;
+  bool is_apart(const Leaf& leaf, const Tree::Node& node, const SmallBox& box) const {
     const Vec3 middle = 0.5 * (box.lowest() + box.highest()), half = box.highest() - middle;
     const auto beyond = [&](const Vec3& way, const Vec3& from) {
       const double reach = glm::dot(glm::abs(way), half) + tolerance_ * glm::length(way);
       return glm::dot(way, middle - from) - reach;
     };
-    for (Index i = leaf.begin; i < leaf.end; ++i) {
-      const Index t = tree_->triangle(i);
-      const Vec3 n = area(t);
-      bool apart = beyond(n, corner(t, 0)) > 0 || beyond(-n, corner(t, 0)) > 0;
-      for (Index k = 0; k < 3 && !apart; ++k)
-        apart = beyond(glm::cross(corner(t, k + 1) - corner(t, k), n), corner(t, k)) > 0;
+    for (Index i = 0; i < node.end - node.begin; ++i) {
+      const Facet& t = leaf.facets[i];
+      bool apart = beyond(t.area, t.at[0]) > 0 || beyond(-t.area, t.at[0]) > 0;
+      for (std::size_t k = 0; k < 3 && !apart; ++k)
+        apart = beyond(glm::cross(t.at[(k + 1) % 3] - t.at[k], t.area), t.at[k]) > 0;
       if (!apart) return false;
     }
     return true;
   }
 
-  void cross_pair(Index s, Index t) {
-    if (in_shells_ && shell_[s] != shell_[t]) return;
-    if (budget_ > 0) --budget_;
-    int shared = 0;
-    for (const Index v : surface_.triangles[s]) {
-      for (const Index w : surface_.triangles[t]) shared += v == w ? 1 : 0;
+  // Whether a plane across the way between their middles has the two triangles on its two sides,
+  // but for a common corner. Most pairs of neighbours end here.
+  bool are_on_two_sides(const Facet& s, const Facet& t, bool share_a_corner) const {
+    const Vec3 way = (s.at[0] + s.at[1] + s.at[2]) - (t.at[0] + t.at[1] + t.at[2]);
+    const double near = tolerance_ * (std::abs(way.x) + std::abs(way.y) + std::abs(way.z));
+    std::array<double, 3> of_s{}, of_t{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      of_s[k] = glm::dot(way, s.at[k] - s.at[0]);
+      of_t[k] = glm::dot(way, t.at[k] - s.at[0]);
     }
-    if (shared >= 2) return;
-    if (shared == 0 && !tree_->box(s).meets(tree_->box(t))) return;
-    const Vec3 n = area(s), m = area(t);
+    if (share_a_corner) {
+      std::size_t i = 0, j = 0;
+      while (std::ranges::find(t.corners, s.corners[i]) == t.corners.end()) ++i;
+      while (t.corners[j] != s.corners[i]) ++j;
+      // Their own two corners stand apart from the common one.
+      const double common = of_s[i];
+      of_s[i] = std::numeric_limits<double>::infinity();
+      of_t[j] = -of_s[i];
+      return std::ranges::min(of_s) > common + near && std::ranges::max(of_t) < common - near;
+    }
+    return std::ranges::min(of_s) > std::ranges::max(of_t) + near;
+  }
+
+  void cross_pair(const Facet& s, const Facet& t) {
+    if (in_shells_ && shell_[s.t] != shell_[t.t]) return;
+    if (budget_ > 0) --budget_;
+    if (!s.box.meets(t.box)) return;  // with a common corner they do
+    int shared = 0;
+    for (const Index v : s.corners) {
+      for (const Index w : t.corners) shared += v == w ? 1 : 0;
+    }
+    if (shared >= 2 || are_on_two_sides(s, t, shared == 1)) return;
+    const Vec3 &n = s.area, &m = t.area;
     std::array<double, 3> of_t{}, of_s{};  // heights over the planes, times the areas
-    for (Index k = 0; k < 3; ++k) {
-      of_t[k] = glm::dot(n, corner(t, k) - corner(s, 0));
-      of_s[k] = glm::dot(m, corner(s, k) - corner(t, 0));
+    for (std::size_t k = 0; k < 3; ++k) {
+      of_t[k] = glm::dot(n, t.at[k] - s.at[0]);
+      of_s[k] = glm::dot(m, s.at[k] - t.at[0]);
     }
     const double near_s = tolerance_ * glm::length(n), near_t = tolerance_ * glm::length(m);
     const auto apart = [](const std::array<double, 3>& h, double near) {
@@ -617,24 +682,24 @@ class WindingCheck {
     const Vec3 along = glm::cross(n, m);
     const double steep = glm::length(along);
     if (steep <= 1e-9 * glm::length(n) * glm::length(m)) {  // in one plane
-      if (shared > 0 || is_beside(s, t) || is_beside(t, s)) return;
-      mark(s, t);
+      if (shared > 0 || is_beside(s.t, t.t) || is_beside(t.t, s.t)) return;
+      mark(s.t, t.t);
       return;
     }
     Vec3 s_low, s_high, t_low, t_high;
-    if (!cut(s, of_s, s_low, s_high, along) || !cut(t, of_t, t_low, t_high, along)) return;
+    if (!cut(s.t, of_s, s_low, s_high, along) || !cut(t.t, of_t, t_low, t_high, along)) return;
     const double low_s = glm::dot(along, s_low - s_low), high_s = glm::dot(along, s_high - s_low);
     const double low_t = glm::dot(along, t_low - s_low), high_t = glm::dot(along, t_high - s_low);
     const double low = std::max(low_s, low_t), high = std::min(high_s, high_t);
     if (low > high) return;
     if (shared == 1 && high - low <= tolerance_ * steep) return;  // only in the shared corner
-    mark(s, t);
+    mark(s.t, t.t);
     if (in_shells_) return;
     const Vec3 unit_n = glm::normalize(n), unit_m = glm::normalize(m), sum = unit_n + unit_m;
     const double outside = glm::dot(sum, unit_n);  // of both
     if (outside < 1e-3) return;
     const Vec3 at = s_low + along * ((low + high) / 2 / (steep * steep));
-    examine(at + sum * (2 * tolerance_ / outside), s, "it passes through itself");
+    examine(at + sum * (2 * tolerance_ / outside), s.t, "it passes through itself");
   }
 
   void mark(Index s, Index t) {
@@ -685,7 +750,9 @@ class WindingCheck {
   bool all_bound_solids_ = true;  ///< none is turned inwards
   bool in_shells_ = false;        ///< look only for shells that pass through themselves
   std::vector<char> crossed_;
-  double felt_ = 0;  ///< m
+  static constexpr std::size_t kLeaves = 64;
+  std::vector<Leaf> leaves_;  ///< lately looked up, each at the rest of its number by kLeaves
+  double felt_ = 0;           ///< m
   std::vector<char> at_pocket_;
   Pockets deepest_;
   std::size_t budget_ = 0;

@@ -36,9 +36,9 @@ constexpr double kRoundings = 8 * std::numeric_limits<double>::epsilon();
 /// Whether rounding of the normals may be larger than the bend of an edge. A segment along the two
 /// triangles may then see them as those of a convex edge, although its corners make it concave.
 bool is_flat(const Vec3& left, const Vec3& right) {
-  constexpr double kFlat = 1e-9;  // rad
+  constexpr double kUnbent = 1e-9;  // rad
   const Vec3 bend = left - right;
-  return glm::dot(bend, bend) <= kFlat * kFlat;
+  return glm::dot(bend, bend) <= kUnbent * kUnbent;
 }
 
 float rounded_up(double value) {
@@ -71,48 +71,57 @@ Vec3 normal_of_neighbours(std::uint32_t index, const LargeArray<Vec3>& vertices,
   return {0, 0, 1};
 }
 
+/// A triangle on its way to its place.
+struct Placed {
+  Vec3 middle;
+  std::uint32_t triangle;
+};
+
 /// Moves the `first` triangles along the longest extent of the middles to the front.
-void split(std::span<const Vec3> middles, std::span<std::uint32_t> triangles, std::size_t first) {
+void split(std::span<Placed> triangles, std::size_t first) {
   Vec3 low(HUGE_VAL), high(-HUGE_VAL);
-  for (const std::uint32_t triangle : triangles) {
-    low = glm::min(low, middles[triangle]);
-    high = glm::max(high, middles[triangle]);
+  for (const Placed& one : triangles) {
+    low = glm::min(low, one.middle);
+    high = glm::max(high, one.middle);
   }
   const Vec3 extent = high - low;
   int axis = 0;
   if (extent[1] > extent[axis]) axis = 1;
   if (extent[2] > extent[axis]) axis = 2;
-  std::nth_element(
-      triangles.begin(), triangles.begin() + static_cast<std::ptrdiff_t>(first), triangles.end(),
-      [&](std::uint32_t p, std::uint32_t q) {
-        return middles[p][axis] != middles[q][axis] ? middles[p][axis] < middles[q][axis] : p < q;
-      });
+  std::nth_element(triangles.begin(), triangles.begin() + static_cast<std::ptrdiff_t>(first),
+                   triangles.end(), [axis](const Placed& p, const Placed& q) {
+                     return p.middle[axis] != q.middle[axis] ? p.middle[axis] < q.middle[axis]
+                                                             : p.triangle < q.triangle;
+                   });
 }
 
 /// Halves a node's triangles until each of its children has its share.
-/// \param halve  called with triangles and how many of them the first half gets
-template <class T, class Halve, class Visit>
-void for_each_child(std::span<T> triangles, const Halve& halve, const Visit& visit) {
-  std::size_t share = 1;
-  while (share * Surface::kWidth < triangles.size()) share *= Surface::kWidth;
-  const auto divide = [&](const auto& self, std::span<T> some) -> void {
-    if (some.size() <= share) return visit(some);
-    const std::size_t half = (some.size() + share) / (2 * share) * share;
-    halve(some, half);
-    self(self, some.first(half));
-    self(self, some.subspan(half));
+/// \param halve  called with the range of triangles and how many of them the first half gets
+template <class Halve, class Visit>
+void for_each_child(std::uint32_t begin, std::uint32_t end, const Halve& halve,
+                    const Visit& visit) {
+  std::uint32_t share = 1;
+  while (std::size_t{share} * Surface::kWidth < end - begin)
+    share *= static_cast<std::uint32_t>(Surface::kWidth);
+  const auto divide = [&](const auto& self, std::uint32_t from, std::uint32_t to) -> void {
+    if (to - from <= share) return visit(from, to);
+    const std::uint32_t half = (to - from + share) / (2 * share) * share;
+    halve(from, to, half);
+    self(self, from, from + half);
+    self(self, from + half, to);
   };
-  divide(divide, triangles);
+  divide(divide, begin, end);
 }
 
-/// Sorts triangles so that each node's are side by side, before there is any node: the middles are
-/// then no longer needed.
-void sort_for_nodes(std::span<const Vec3> middles, std::span<std::uint32_t> triangles) {
+/// Sorts triangles so that each node's are side by side, before there is any node.
+void sort_for_nodes(std::span<Placed> triangles) {
   for_each_child(
-      triangles,
-      [&](std::span<std::uint32_t> some, std::size_t first) { split(middles, some, first); },
-      [&](std::span<std::uint32_t> child) {
-        if (child.size() > 1) sort_for_nodes(middles, child);
+      0, static_cast<std::uint32_t>(triangles.size()),
+      [&](std::uint32_t from, std::uint32_t to, std::uint32_t first) {
+        split(triangles.subspan(from, to - from), first);
+      },
+      [&](std::uint32_t from, std::uint32_t to) {
+        if (to - from > 1) sort_for_nodes(triangles.subspan(from, to - from));
       });
 }
 
@@ -313,18 +322,22 @@ void Surface::find_edges() {
 
 void Surface::build_tree() {
   std::vector<std::uint32_t> order(triangles_.size());
-  std::iota(order.begin(), order.end(), 0U);
   {
-    std::vector<Vec3> middles(triangles_.size());
-    for (std::size_t i = 0; i < triangles_.size(); ++i) {
+    std::vector<Placed> placed(triangles_.size());
+    for (std::uint32_t i = 0; i < placed.size(); ++i) {
       const auto& c = triangles_[i].corners;
-      middles[i] = (vertices_[c[0]] + vertices_[c[1]] + vertices_[c[2]]) / 3.0;
+      placed[i] = {(vertices_[c[0]] + vertices_[c[1]] + vertices_[c[2]]) / 3.0, i};
     }
-    sort_for_nodes(middles, order);
+    sort_for_nodes(placed);
+    for (std::size_t i = 0; i < placed.size(); ++i) order[i] = placed[i].triangle;
   }
+  sort_by(order);
+  order = {};
   nodes_.reserve(triangles_.size() / (kWidth - 1) + 16);
-  root_ = build_node(order);
-  sort_by(order);  // a few places of nodes_ stay unused: to give them back would copy all
+  Extent all;
+  std::uint32_t used = 0;
+  // A few places of nodes_ stay unused: to give them back would copy all.
+  root_ = build_node(0, static_cast<std::uint32_t>(triangles_.size()), used, all);
 }
 
 /// Sorts triangles and vertices as the tree has them: what is near in space is near in memory.
@@ -348,87 +361,94 @@ void Surface::sort_by(std::span<const std::uint32_t> order) {
   for (std::uint32_t& corner : vertex_place) {
     if (corner == kNone) corner = used++;  // of no triangle: to the end
   }
-  const auto rename = [&](const auto& self, std::uint32_t name) -> void {
-    Node& node = nodes_[index_of(name)];
-    for (std::size_t k = 0; k < kWidth && node.low[0][k] <= node.high[0][k]; ++k) {
-      if (!is_leaf(name)) {
-        self(self, node.children[k]);
-      } else {
-        node.children[k] = place[node.children[k]];
-      }
-    }
-  };
-  rename(rename, root_);
   move_to(triangles_, place);
   move_to(vertices_, vertex_place);
   std::erase_if(file_order_, [&](std::uint32_t i) { return triangles_[i].is_back(); });
 }
 
 /// All nodes are full, except for the last of each level.
-std::uint32_t Surface::build_node(std::span<const std::uint32_t> triangles) {
+/// \param used  vertices of the triangles before `begin`, then before `end`; a subtree's others are
+/// shared with earlier ones \param extent  of all its triangles
+std::uint32_t Surface::build_node(std::uint32_t begin, std::uint32_t end, std::uint32_t& used,
+                                  Extent& extent) {
   const auto index = static_cast<std::uint32_t>(nodes_.size());
   Node node;
   for (std::size_t k = 0; k < 3; ++k) {
     node.low[k] = Lanes{} + std::numeric_limits<float>::infinity();
     node.high[k] = -node.low[k];
   }
-  const bool leaf = triangles.size() <= kWidth;
+  const bool leaf = end - begin <= kWidth;
   nodes_.push_back(node);
   std::size_t child = 0;
   for_each_child(
-      triangles, [](const auto&, std::size_t) {},
-      [&](std::span<const std::uint32_t> some) {
-        set_box(some, child, node);
-        set_normals(some, child, node);
-        node.children[child++] = leaf ? some.front() : build_node(some);
+      begin, end, [](std::uint32_t, std::uint32_t, std::uint32_t) {},
+      [&](std::uint32_t from, std::uint32_t to) {
+        const std::uint32_t first = used;
+        Extent own;
+        if (leaf) {
+          node.children[child] = from;
+          own.add(extent_of(from));
+          for (const std::uint32_t corner : triangles_[from].corners)
+            used = std::max(used, corner + 1);
+        } else {
+          node.children[child] = build_node(from, to, used, own);
+        }
+        set_child(node, child++, own, from, to, first, used);
+        extent.add(own);
       });
   nodes_[index] = node;
   return index << 1 | (leaf ? 1U : 0U);
 }
 
-void Surface::set_box(std::span<const std::uint32_t> triangles, std::size_t child,
-                      Node& node) const {
-  Vec3 low(HUGE_VAL), high(-HUGE_VAL);
-  for (const std::uint32_t triangle : triangles) {
-    for (const std::uint32_t corner : triangles_[triangle].corners) {
-      low = glm::min(low, vertices_[corner] - centre_);
-      high = glm::max(high, vertices_[corner] - centre_);
-    }
+/// Of a triangle, with the normals of its neighbours across touched edges.
+Surface::Extent Surface::extent_of(std::uint32_t triangle) const {
+  const SurfaceTriangle& t = triangles_[triangle];
+  Extent out;
+  for (const std::uint32_t corner : t.corners) {
+    out.low = glm::min(out.low, vertices_[corner] - centre_);
+    out.high = glm::max(out.high, vertices_[corner] - centre_);
   }
-  for (int k = 0; k < 3; ++k) {
-    node.low[static_cast<std::size_t>(k)][child] = -rounded_up(-low[k]);
-    node.high[static_cast<std::size_t>(k)][child] = rounded_up(high[k]);
+  out.least_normal = out.most_normal = t.normal;
+  for (std::uint32_t k = 0; k < 3; ++k) {
+    if (!t.owns(k) || !t.touches(k)) continue;
+    const Vec3& normal = triangles_[SurfaceTriangle::triangle_of(t.across[k])].normal;
+    out.least_normal = glm::min(out.least_normal, normal);
+    out.most_normal = glm::max(out.most_normal, normal);
   }
+  return out;
 }
 
-void Surface::set_normals(std::span<const std::uint32_t> triangles, std::size_t child,
-                          Node& node) const {
-  Vec3 low(HUGE_VAL), high(-HUGE_VAL);
-  const auto add = [&](const Vec3& normal) {
-    low = glm::min(low, normal);
-    high = glm::max(high, normal);
-  };
-  for (const std::uint32_t index : triangles) {
-    const SurfaceTriangle& t = triangles_[index];
-    add(t.normal);
-    for (std::uint32_t k = 0; k < 3; ++k) {
-      if (t.owns(k) && t.touches(k))
-        add(triangles_[SurfaceTriangle::triangle_of(t.across[k])].normal);
-    }
-  }
+void Surface::Extent::add(const Extent& other) {
+  low = glm::min(low, other.low);
+  high = glm::max(high, other.high);
+  least_normal = glm::min(least_normal, other.least_normal);
+  most_normal = glm::max(most_normal, other.most_normal);
+}
+
+/// \param from, to  its triangles \param first, last  vertices that occur in these for the first
+/// time
+void Surface::set_child(Node& node, std::size_t child, const Extent& extent, std::uint32_t from,
+                        std::uint32_t to, std::uint32_t first, std::uint32_t last) const {
   Vec3 middle;
   for (int k = 0; k < 3; ++k) {
-    const auto rounded = static_cast<float>(0.5 * (low[k] + high[k]));
-    node.middle[static_cast<std::size_t>(k)][child] = rounded;
+    const auto axis = static_cast<std::size_t>(k);
+    node.low[axis][child] = -rounded_up(-extent.low[k]);
+    node.high[axis][child] = rounded_up(extent.high[k]);
+    const auto rounded = static_cast<float>(0.5 * (extent.least_normal[k] + extent.most_normal[k]));
+    node.middle[axis][child] = rounded;
     middle[k] = rounded;
   }
   double top = -HUGE_VAL;
-  for (const std::uint32_t index : triangles) {
-    for (const std::uint32_t corner : triangles_[index].corners)
-      top = std::max(top, glm::dot(middle, vertices_[corner] - centre_));
+  for (std::uint32_t v = first; v < last; ++v)
+    top = std::max(top, glm::dot(middle, vertices_[v] - centre_));
+  for (std::uint32_t i = from; i < to; ++i) {
+    for (const std::uint32_t corner : triangles_[i].corners) {
+      if (corner < first) top = std::max(top, glm::dot(middle, vertices_[corner] - centre_));
+    }
   }
   node.top[child] = rounded_up(top);
-  node.radius[child] = rounded_up(0.5 * glm::length(high - low) + 1e-6);
+  node.radius[child] =
+      rounded_up(0.5 * glm::length(extent.most_normal - extent.least_normal) + 1e-6);
 }
 
 int Surface::winding(const Vec3& point) const {

@@ -4,6 +4,7 @@
 // m.
 
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -123,9 +124,17 @@ class Surface {
   void find_edges();
   void build_tree();
   void sort_by(std::span<const std::uint32_t> order);
-  std::uint32_t build_node(std::span<const std::uint32_t> triangles);
-  void set_box(std::span<const std::uint32_t> triangles, std::size_t child, Node& node) const;
-  void set_normals(std::span<const std::uint32_t> triangles, std::size_t child, Node& node) const;
+  /// Of the corners about the centre, and of the normals.
+  struct Extent {
+    Vec3 low{HUGE_VAL}, high{-HUGE_VAL};  ///< m
+    Vec3 least_normal{HUGE_VAL}, most_normal{-HUGE_VAL};
+    void add(const Extent& other);
+  };
+  Extent extent_of(std::uint32_t triangle) const;
+  std::uint32_t build_node(std::uint32_t begin, std::uint32_t end, std::uint32_t& used,
+                           Extent& extent);
+  void set_child(Node& node, std::size_t child, const Extent& extent, std::uint32_t from,
+                 std::uint32_t to, std::uint32_t first, std::uint32_t last) const;
 
   LargeArray<Vec3> vertices_;
   LargeArray<SurfaceTriangle> triangles_;

@@ -147,7 +147,8 @@ TEST(FlatFaces, TrianglesAtPocketsStay) {
   ClosedSurface surface;
   surface.vertices = soup.vertices;
   for (const auto& face : soup.faces) surface.triangles.push_back({face[0], face[1], face[2]});
-  link_triangles(surface.vertices, surface.triangles, surface.across);
+  link_triangles(surface.vertices, surface.triangles,
+                 SideGroups(surface.vertices.size(), surface.triangles), surface.across);
   surface.flat_face = find_flat_faces(surface, 1e-12);
   const auto before = surface.triangles;
   ClosedSurface pockets = surface;
