@@ -81,9 +81,9 @@ bool varies_a_group(const SweepPlan& plan) {
   });
 }
 
-std::vector<std::string> columns_of(const StoredBlock& block, const CellName& stimulus,
-                                    const std::string& renderer, const std::string& group,
-                                    const std::vector<std::string>& measures) {
+std::vector<std::string> block_columns(const StoredBlock& block, const CellName& stimulus,
+                                       const std::string& renderer, const std::string& group,
+                                       const std::vector<std::string>& measures) {
   std::string place = "_" + block.name;
   if (!stimulus.base.empty()) place += "_" + stimulus.base;
   for (const auto& [factor, level] : stimulus.levels) place += "_" + level;
@@ -138,7 +138,7 @@ std::vector<TaskCellColumns> task_columns(const SweepPlan& plan) {
       for (const std::string& renderer : block.renderers) {
         const auto add = [&](const CellName& stimulus, const std::vector<std::string>& measures) {
           cells.push_back({block.task, block.name, stimulus.text(), renderer, group, measures,
-                           columns_of(block, stimulus, renderer, group, measures)});
+                           block_columns(block, stimulus, renderer, group, measures)});
         };
         for (const std::string& stimulus : block.stimuli) {
           const bool apart = plan.has_cells && !block.cells.empty();

@@ -55,7 +55,7 @@ std::optional<char32_t> only_character(const std::string& text) {
 }
 
 /// Lower case of the Latin, Greek and Cyrillic letters on keyboards.
-char32_t lower_case(char32_t c) {
+char32_t lower_letter(char32_t c) {
   const auto within = [c](char32_t low, char32_t high) { return c >= low && c <= high; };
   if (within(U'A', U'Z') || (within(0xC0, 0xDE) && c != 0xD7) || within(0x391, 0x3A9) ||
       within(0x410, 0x42F))
@@ -121,7 +121,7 @@ std::string key_fault(const std::string& name) {
 
 std::string one_key(const std::string& name) {
   const auto character = only_character(name);
-  return character && *character < 0x10000 ? utf8(lower_case(*character)) : name;
+  return character && *character < 0x10000 ? utf8(lower_letter(*character)) : name;
 }
 
 std::string KeysTaken::add(const std::string& name) {

@@ -67,7 +67,7 @@ bool is_label(const std::string& pointer) {
   return pointer.starts_with("/response/keys/") && pointer.ends_with("/label");
 }
 
-std::string listed(const std::vector<std::string>& pointers) {
+std::string listed_pointers(const std::vector<std::string>& pointers) {
   constexpr std::size_t kShown = 8;
   std::string words;
   for (std::size_t i = 0; i < std::min(kShown, pointers.size()); ++i)
@@ -102,7 +102,7 @@ std::string in_words(const ProtocolDifference& difference) {
   std::string words;
   const auto add = [&words](const char* kind, const std::vector<std::string>& pointers) {
     if (pointers.empty()) return;
-    words += (words.empty() ? "" : "; ") + std::string(kind) + ": " + listed(pointers);
+    words += (words.empty() ? "" : "; ") + std::string(kind) + ": " + listed_pointers(pointers);
   };
   add("stimuli and order", difference.design);
   add("other settings", difference.settings);

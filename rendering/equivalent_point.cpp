@@ -15,7 +15,7 @@ using Kind = ContactFeature::Kind;
 constexpr int kMostFaces = 12;  // to each side; each face moves the point by less than its length
 
 /// Angle of the segment to a face as a share of the blend angle, -1 to 1; 1: its first end dips.
-double turned(double slope, double length) {
+double turned_by(double slope, double length) {
   if (slope >= tick::kSinBlendAngle * length) return 1;
   if (slope <= -tick::kSinBlendAngle * length) return -1;
   return std::clamp(tick::small_asin(slope / length) / tick::kBlendAngle, -1.0, 1.0);
@@ -143,7 +143,7 @@ class Faces {
   }
 
   double turned_to(const Face& face) const {
-    return turned(glm::dot(facet_of(face).normal, parts_[face.part].d), length_);
+    return turned_by(glm::dot(facet_of(face).normal, parts_[face.part].d), length_);
   }
 
   bool is_on(const stimuli::ConvexMesh& mesh, std::uint32_t index, const Vec3& point) const {
@@ -259,7 +259,7 @@ void place_along_border(const stimuli::ConvexMesh& mesh, const WalkResult& hit, 
   const stimuli::Facet& facet = mesh.facets()[index];
   const double slope = glm::dot(facet.normal, d);
   if (std::abs(slope) >= tick::kSinBlendAngle * length) return;
-  const double angle = turned(slope, length);
+  const double angle = turned_by(slope, length);
   tick::Portion portion;
   if (facet.side_count > tick::kClippedOneByOne) {
     portion.clip_by_many(mesh, index, tip, d, slack);

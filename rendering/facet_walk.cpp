@@ -115,8 +115,8 @@ template <bool kEdges>
 
 // Rare. Takes a copy: a value passed by reference stays in memory for the whole walk.
 template <bool kSegment>
-[[gnu::cold, gnu::noinline]] bool is_off(const stimuli::ConvexMesh& mesh, Measured at,
-                                         const Vec3& tip, const Vec3& d) {
+[[gnu::cold, gnu::noinline]] bool is_off_facet(const stimuli::ConvexMesh& mesh, Measured at,
+                                               const Vec3& tip, const Vec3& d) {
   return distance_off<kSegment>(mesh, at, tip, d) > kOffTolerance * (mesh.size() + glm::length(d));
 }
 
@@ -141,7 +141,8 @@ template <bool kSegment, bool kOutside = false>
       const Vec3 end = kSegment && at.probe_fraction > 0 ? tip + d : tip;
       const stimuli::Neighbour side = beyond_side(mesh, at.index, end + at.depth * at.normal);
       if (side.edge == kNone) break;
-      if (kSegment && parallel_to_facet(at.slope, d) && !is_off<kSegment>(mesh, at, tip, d)) break;
+      if (kSegment && parallel_to_facet(at.slope, d) && !is_off_facet<kSegment>(mesh, at, tip, d))
+        break;
       next = step_from_facet<kSegment>(mesh, at, side, tip, d);
     }
     if (!(next.depth < at.depth - gain)) {
@@ -157,7 +158,7 @@ template <bool kSegment, bool kOutside = false>
   }
   WalkResult result = to_result(at, capped);
   if (stalled || at.nearly_parallel) [[unlikely]] {
-    result.not_converged = at.depth >= 0 && is_off<kSegment>(mesh, at, tip, d);
+    result.not_converged = at.depth >= 0 && is_off_facet<kSegment>(mesh, at, tip, d);
   }
   return result;
 }
@@ -188,7 +189,7 @@ WalkResult holding_feature(const stimuli::ConvexMesh& mesh, const Vec3& tip, con
   WalkResult best;
   double nearest = HUGE_VAL;
   const auto consider = [&](const Measured& m) {
-    if (!(m.depth >= 0) || is_off<kSegment>(mesh, m, tip, d)) return;
+    if (!(m.depth >= 0) || is_off_facet<kSegment>(mesh, m, tip, d)) return;
     const Vec3 beside = m.depth * m.normal - shift;
     if (!(glm::dot(beside, beside) < nearest)) return;
     nearest = glm::dot(beside, beside);

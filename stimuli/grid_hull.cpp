@@ -12,7 +12,7 @@ namespace palpate::stimuli {
 namespace {
 
 using Index = std::uint32_t;
-constexpr Index kNone = 0xffffffff;
+constexpr Index kNotSet = 0xffffffff;
 
 // Grid coordinates are below 2^40, so a height, a triple product, is below 2^124.
 constexpr double kMostSteps = 0x1p40;
@@ -177,7 +177,7 @@ class Hull {
     std::vector<Index> freed;
     const std::vector<Side> horizon = remove_seen(start, point, freed);
     const auto first = static_cast<Index>(faces_.size());
-    face_from_.resize(points_.size(), kNone);
+    face_from_.resize(points_.size(), kNotSet);
     for (const Side& side : horizon) {
       const auto made = static_cast<Index>(faces_.size());
       faces_.push_back(face_of(side.from, side.to, point));
@@ -229,12 +229,12 @@ GridHull grid_hull(const std::vector<Vec3>& points, double error) {
   }
   Hull hull(grid_points);
   if (!hull.build()) return result;
-  std::vector<Index> number(points.size(), kNone);
+  std::vector<Index> number(points.size(), kNotSet);
   for (const Face& face : hull.faces()) {
     if (face.gone) continue;
     std::vector<Index> corners;
     for (const Index corner : face.corner) {
-      if (number[corner] == kNone) {
+      if (number[corner] == kNotSet) {
         number[corner] = static_cast<Index>(result.soup.vertices.size());
         const GridPoint& grid_point = grid_points[corner];
         result.point.push_back(corner);

@@ -147,12 +147,14 @@ void ZipArchive::read(std::string_view name,
 
 /// Names of elements and attributes as expat gives them: namespace, a bar, name.
 constexpr char kBar = '|';
-constexpr std::string_view kCore = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02";
+constexpr std::string_view kCoreSpecification =
+    "http://schemas.microsoft.com/3dmanufacturing/core/2015/02";
 constexpr std::string_view kProduction =
     "http://schemas.microsoft.com/3dmanufacturing/production/2015/06";
 /// Extensions that may be required: they say nothing of the surface, or it is read.
 constexpr std::array<std::string_view, 4> kKnownExtensions = {
-    kCore, kProduction, "http://schemas.microsoft.com/3dmanufacturing/material/2015/02",
+    kCoreSpecification, kProduction,
+    "http://schemas.microsoft.com/3dmanufacturing/material/2015/02",
     "http://schemas.microsoft.com/3dmanufacturing/trianglesets/2021/07"};
 constexpr std::string_view kRelationship =
     "http://schemas.openxmlformats.org/package/2006/relationships|Relationship";
@@ -329,9 +331,10 @@ class ModelPart final : public XmlPart {
  private:
   // The words of an element's name in the core namespace; those of others are skipped.
   static std::string_view core_name(std::string_view element) {
-    const bool core = element.size() > kCore.size() && element.starts_with(kCore) &&
-                      element[kCore.size()] == kBar;
-    return core ? element.substr(kCore.size() + 1) : std::string_view();
+    const bool core = element.size() > kCoreSpecification.size() &&
+                      element.starts_with(kCoreSpecification) &&
+                      element[kCoreSpecification.size()] == kBar;
+    return core ? element.substr(kCoreSpecification.size() + 1) : std::string_view();
   }
 
   void prefix(const std::string& prefix, const std::string& uri) override {
@@ -365,7 +368,8 @@ class ModelPart final : public XmlPart {
   void begin_model(std::string_view kind, const XmlAttributes& attributes) {
     begun_ = true;
     if (kind != "model")
-      refuse("a model of 3MF, core specification (" + std::string(kCore) + ")", nullptr);
+      refuse("a model of 3MF, core specification (" + std::string(kCoreSpecification) + ")",
+             nullptr);
     if (const char* unit = attributes.find("unit"); unit != nullptr) {
       metres_ = metres_of(unit);
       if (metres_ == 0) refuse("micron, millimeter, centimeter, inch, foot or meter", unit);

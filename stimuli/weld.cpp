@@ -12,7 +12,7 @@ namespace palpate::stimuli {
 namespace {
 
 using Index = std::uint32_t;
-constexpr Index kNone = 0xffffffff;
+constexpr Index kFreeSlot = 0xffffffff;
 
 std::uint64_t hash_of(const Vec3& point) {
   std::uint64_t hash = 0;
@@ -32,14 +32,14 @@ Index kept_for(std::vector<Index>& kept, Index i) {
 }  // namespace
 
 std::vector<Index> weld_equal(const std::vector<Vec3>& points) {
-  std::vector<Index> slots(std::bit_ceil(2 * points.size() + 16), kNone);
+  std::vector<Index> slots(std::bit_ceil(2 * points.size() + 16), kFreeSlot);
   std::vector<Index> kept(points.size());
   for (Index i = 0; i < points.size(); ++i) {
     std::size_t slot = hash_of(points[i]) & (slots.size() - 1);
-    while (slots[slot] != kNone && points[slots[slot]] != points[i]) {
+    while (slots[slot] != kFreeSlot && points[slots[slot]] != points[i]) {
       slot = (slot + 1) & (slots.size() - 1);
     }
-    if (slots[slot] == kNone) slots[slot] = i;
+    if (slots[slot] == kFreeSlot) slots[slot] = i;
     kept[i] = slots[slot];
   }
   return kept;

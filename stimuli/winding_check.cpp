@@ -595,13 +595,7 @@ class WindingCheck {
       if (y.right == 0 && is_apart(leaf_of(b), y, x.box)) return;
     }
     if (x.right == 0 && y.right == 0) {
-      const Leaf of_x = leaf_of(a);  // the other one may take its place
-      const Leaf& of_y = leaf_of(b);
-      const Index count_x = x.end - x.begin, count_y = y.end - y.begin;
-      for (Index i = 0; i < count_x; ++i) {
-        for (Index k = a == b ? i + 1 : 0; k < count_y; ++k)
-          cross_pair(of_x.facets[i], of_y.facets[k]);
-      }
+      cross_leaves(a, b);
     } else if (a == b) {
       cross(a + 1, a + 1);
       cross(x.right, x.right);
@@ -614,6 +608,16 @@ class WindingCheck {
     } else {
       cross(a, b + 1);
       cross(a, y.right);
+    }
+  }
+
+  void cross_leaves(Index a, Index b) {
+    const Tree::Node &x = tree_->nodes()[a], &y = tree_->nodes()[b];
+    const Leaf of_x = leaf_of(a);  // the other one may take its place
+    const Leaf& of_y = leaf_of(b);
+    for (Index i = 0; i < x.end - x.begin; ++i) {
+      for (Index k = a == b ? i + 1 : 0; k < y.end - y.begin; ++k)
+        cross_pair(of_x.facets[i], of_y.facets[k]);
     }
   }
 

@@ -196,6 +196,28 @@ def types_of(text):
         head = "" if piece in "{};" and piece else piece
 
 
+CODE = re.compile(r'//.*|/\*.*?\*/|^\s*#.*|R"(\w*)\(.*?\)\1"|"(\\.|[^"\\\n])*"|\'(\\.|[^\'\\\n])\'', re.M)
+
+
+def names_in(text):
+    """(namespace, whether it is without a name, name) of functions and constants outside of classes and functions."""
+    scopes, head = [], ""  # of the open braces: namespaces, "": one without a name, None: a body
+    for piece in re.split(r"([{};])", CODE.sub("", text)):
+        if piece in ("{", ";") and None not in scopes:
+            place = "::".join(filter(None, scopes)), "" in scopes
+            names = re.findall(r"\b(k[A-Z]\w*)\s*(?:\[\w*\])?\s*=", head)
+            function = re.search(r"^[^(=]*?(?<![\w:~])(\w+)\(", head.strip(), re.S)
+            if not names and function and not re.search(r"\b(operator|using|friend)\b", head):
+                names = [function[1]]
+            yield from ((*place, name) for name in names)
+        if piece == "{":
+            opened = re.search(r"\bnamespace\s*([\w:]*)\s*$", head)
+            scopes.append(opened[1] if opened else None)
+        elif piece == "}":
+            scopes.pop()
+        head = "" if piece in "{};" and piece else piece
+
+
 class Architecture(unittest.TestCase):
     def test_includes_point_one_way(self):
         faults = []
@@ -250,6 +272,23 @@ class Architecture(unittest.TestCase):
                 places[qualified].append(name)
         faults = {qualified: names for qualified, names in places.items() if len(names) > 1}
         self.assertEqual(faults, {}, "one definition each: the linker takes any of them for all")
+
+    def test_no_name_of_a_header_is_hidden(self):
+        # Sources are compiled in batches: what one of them hides from the others would hide a header's name from those after it.
+        declared = collections.defaultdict(set)
+        for name, path in SOURCES.items():
+            if name.endswith(".h"):
+                for place, _, declares in names_in(path.read_text()):
+                    declared[declares].add((place, name))
+        faults = set()
+        for name, path in SOURCES.items():
+            if not name.endswith(".cpp") or name.startswith(EVERYTHING):
+                continue
+            for place, unnamed, hides in names_in(path.read_text()):
+                faults |= {f"{name}: {hides} is a name of {header}" for outer, header in declared[hides]
+                           if unnamed and within(place.replace("::", "/"), outer.replace("::", "/"))
+                           and header != name[:-len("cpp")] + "h"}
+        self.assertEqual(faults, set())
 
     def test_rooms_form_no_cycle(self):
         order = []

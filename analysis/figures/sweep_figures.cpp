@@ -221,7 +221,7 @@ Panel drivers_panel(const SweepAnalysis& analysis, const Drivers& drivers) {
 }
 
 /// States whether the total indices include chance within the points.
-std::string chance_note(const SweepAnalysis& analysis) {
+std::string note_on_chance(const SweepAnalysis& analysis) {
   std::string with;
   for (const Drivers& drivers : analysis.drivers) {
     if (drivers.strongest.empty() || drivers.sobol->noise_share) continue;
@@ -246,7 +246,7 @@ Figure drivers_figure(const SweepAnalysis& analysis) {
     figure.legend = {{"with interactions (total)", Role::ink, MarkerShape::circle},
                      {"alone (first order)", Role::ray, MarkerShape::square}};
     figure.notes = {"Shares of the variance over the space, with 95 % bootstrap intervals. " +
-                    chance_note(analysis)};
+                    note_on_chance(analysis)};
   } else {
     figure.legend = {{"partial, adjusted for the others", Role::ink, MarkerShape::circle},
                      {"Spearman", Role::ray, MarkerShape::square}};

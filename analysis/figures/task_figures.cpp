@@ -105,7 +105,7 @@ Panel track_panel(const ParticipantFunction& one, const Track& track, const std:
 }
 
 /// "JND (N/m)"
-std::string measure_title(const TaskGroup& group) {
+std::string group_title(const TaskGroup& group) {
   std::string name = measure_plural(group.measure);
   name.pop_back();
   return group.unit.empty() ? name : name + " (" + printable(group.unit) + ")";
@@ -154,7 +154,7 @@ FigureAxis group_axis(const TaskGroup& group) {
   const double margin = 0.08 * range;
   const bool all_above = low > 0;
   low -= margin;
-  return linear_axis(all_above ? std::max(0.0, low) : low, high + margin, measure_title(group));
+  return linear_axis(all_above ? std::max(0.0, low) : low, high + margin, group_title(group));
 }
 
 /// Each participant's figures are joined by a line.

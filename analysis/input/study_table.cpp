@@ -553,7 +553,7 @@ StudyTable read_tasks_csv(const std::string& path, const std::vector<std::string
   return table;
 }
 
-std::optional<TrialTable> times_of(const StudyTable& table) {
+std::optional<TrialTable> times_of_trials(const StudyTable& table) {
   TrialTableBuilder builder;
   std::size_t n = 0;
   for (const StudyTrial& trial : table.trials) {
@@ -749,7 +749,7 @@ StudyTable read_study_store(data::Store& store, const std::string& protocol) {
 }
 
 void identify_times(StudyTable& table) {
-  if (!table.times) table.times = times_of(table);
+  if (!table.times) table.times = times_of_trials(table);
 }
 
 }  // namespace palpate::analysis

@@ -290,7 +290,7 @@ Json test_json(const CueTest& test) {
   return out;
 }
 
-std::string headline(const CueAnalysis& analysis) {
+std::string cue_headline(const CueAnalysis& analysis) {
   if (analysis.participants.empty()) return "No participant has figures for both cues";
   double weight = 0;
   for (const CueParticipant& one : analysis.participants) weight += one.weight_visual;
@@ -305,7 +305,7 @@ std::string cue_text(const CueAnalysis& analysis) {
   std::string out;
   if (const std::string label = label_of(analysis); !label.empty())
     out += paragraph_text(label + ": the answers below are those of a model.") + "\n";
-  out += paragraph_text(headline(analysis) + ".");
+  out += paragraph_text(cue_headline(analysis) + ".");
   for (const std::string& sentence : cue_sentences(analysis)) out += paragraph_text(sentence);
   out += "\n" + table_text(participants_table(analysis));
   if (!analysis.models.empty()) out += "\n" + table_text(models_table(analysis));
@@ -366,7 +366,7 @@ std::vector<Figure> cue_figures(const CueAnalysis& analysis) {
 
 std::string cue_html(const CueAnalysis& analysis, const CueSource& source) {
   const std::string label = label_of(analysis);
-  HtmlPage page(headline(analysis), label);
+  HtmlPage page(cue_headline(analysis), label);
   if (!label.empty())
     page.put_banner(label + ": the answers here are those of a model, not of humans.");
   page.below_title() += "<p>" + escaped_sentence(kHowTo) + "</p>\n";

@@ -30,7 +30,7 @@ std::string settings_note(const MovementAnalysis& analysis) {
 }
 
 /// Four significant digits.
-std::string short_number(const std::optional<double>& value) {
+std::string four_digits(const std::optional<double>& value) {
   if (!value || !std::isfinite(*value)) return kMissing;
   const double size = std::abs(*value);
   const int before = size >= 1 ? static_cast<int>(std::floor(std::log10(size))) + 1 : 1;
@@ -70,11 +70,11 @@ Table measures_table(const MovementAnalysis& analysis, std::size_t comparison) {
       const auto& interval = shape.t_test.log_ratio_ci95;
       const ModelEstimate* model = model_contrast(measure, comparison, s);
       table.rows.push_back({definition(measure.measure).name, analysis.table.trials.shapes[s],
-                            short_number(mean_in_units(measure, pair.reference_at, s)),
-                            short_number(mean_in_units(measure, pair.renderer_at, s)),
-                            short_number(shape.mean_log_ratio),
-                            short_number(interval ? std::optional(interval->low) : std::nullopt),
-                            short_number(interval ? std::optional(interval->high) : std::nullopt),
+                            four_digits(mean_in_units(measure, pair.reference_at, s)),
+                            four_digits(mean_in_units(measure, pair.renderer_at, s)),
+                            four_digits(shape.mean_log_ratio),
+                            four_digits(interval ? std::optional(interval->low) : std::nullopt),
+                            four_digits(interval ? std::optional(interval->high) : std::nullopt),
                             number(shape.t_test.t, 2), number(shape.t_test.df, 0),
                             p_or_missing(shape.t_test.p_holm),
                             p_or_missing(model ? model->p_holm : std::nullopt)});
@@ -111,10 +111,10 @@ Table gains_table(const MovementAnalysis& analysis) {
                   "time by measure"};
   for (const AdjustedGain& gain : analysis.gains) {
     table.rows.push_back({analysis.table.trials.shapes[gain.shape], definition(gain.measure).name,
-                          std::to_string(gain.n_trials), short_number(gain.time_difference),
-                          short_number(gain.measure_difference),
-                          short_number(gain.time_difference_at_equal_measure),
-                          short_number(gain.slope)});
+                          std::to_string(gain.n_trials), four_digits(gain.time_difference),
+                          four_digits(gain.measure_difference),
+                          four_digits(gain.time_difference_at_equal_measure),
+                          four_digits(gain.slope)});
   }
   table.notes.push_back(
       "Correct trials, within participants. log time, of measure: difference between the "

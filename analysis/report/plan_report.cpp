@@ -18,7 +18,7 @@
 namespace palpate::analysis {
 namespace {
 
-std::string percent(double proportion) { return fixed(100 * proportion, 1) + " %"; }
+std::string percent_of(double proportion) { return fixed(100 * proportion, 1) + " %"; }
 
 std::string test_name(StudyTest test) {
   return test == StudyTest::paired ? "paired t-tests" : "the mixed model's contrasts";
@@ -49,9 +49,9 @@ void put_columns(std::string& out, const Plan& plan, const PlanCurve& curve,
   for (const PlanPoint& point : curve.points) {
     std::string line = "  " +
                        pad_right(std::to_string(point.design.participants), kPlanNameColumns) +
-                       pad_left(percent(goal_power(plan, point.power)), kNumberColumns);
+                       pad_left(percent_of(goal_power(plan, point.power)), kNumberColumns);
     for (const std::size_t s : shapes) {
-      line += pad_left(percent(point.power.proportion(point.power.found[s])),
+      line += pad_left(percent_of(point.power.proportion(point.power.found[s])),
                        width(column_name(plan, s)));
     }
     if (curve.smallest && curve.smallest->design.participants == point.design.participants) {
@@ -200,8 +200,8 @@ std::string plan_text(const Plan& plan) {
   const PlanSettings& settings = plan.settings;
   const StudyModel& model = plan.model;
   std::string out;
-  put_line(out, "To " + goal_text(plan) + ", with power " + percent(settings.power) + " at alpha " +
-                    fixed(settings.simulation.alpha, 3) + " (" +
+  put_line(out, "To " + goal_text(plan) + ", with power " + percent_of(settings.power) +
+                    " at alpha " + fixed(settings.simulation.alpha, 3) + " (" +
                     test_name(settings.simulation.test) + ", Holm over " +
                     counted(model.shapes.size(), "shape", "shapes") + "):");
   for (const PlanCurve& curve : plan.curves) {
@@ -213,13 +213,13 @@ std::string plan_text(const Plan& plan) {
                    trials + " (" +
                    counted(trials_per_participant(plan, curve.trials), "trial", "trials") +
                    " for each participant): power " +
-                   percent(goal_power(plan, curve.smallest->power)) + ".",
+                   percent_of(goal_power(plan, curve.smallest->power)) + ".",
                "  ");
     } else {
       put_line(out,
                "with " + trials + " " + std::to_string(settings.max_participants) +
                    " participants are not enough: power " +
-                   percent(goal_power(plan, curve.points.back().power)) + ".",
+                   percent_of(goal_power(plan, curve.points.back().power)) + ".",
                "  ");
     }
   }
@@ -228,11 +228,11 @@ std::string plan_text(const Plan& plan) {
   put_line(out, "Log times are drawn with these standard deviations: participants' gains " +
                     fixed(model.gain_sd, 3) + ", additional gains for single shapes " +
                     fixed(model.shape_gain_sd, 3) + ", single trials " +
-                    fixed(model.residual_sd, 3) + "; " + percent(model.proportion_used) +
+                    fixed(model.residual_sd, 3) + "; " + percent_of(model.proportion_used) +
                     " of the trials have a usable time. " +
                     std::to_string(settings.simulation.studies) +
                     " studies for each power (standard error of a power at most " +
-                    percent(0.5 / std::sqrt(static_cast<double>(settings.simulation.studies))) +
+                    percent_of(0.5 / std::sqrt(static_cast<double>(settings.simulation.studies))) +
                     "), seed " + std::to_string(settings.simulation.seed) +
                     ". For a shape without an effect, the number is the rate of false positives.");
   for (const std::string& note : plan.notes) put_line(out, "Note: " + note);

@@ -91,7 +91,7 @@ void add_accuracy_row(const Comparison& comparison, const char* trials,
   if (!left_out.empty()) table.notes.push_back(name + "left out of the model: " + left_out + ".");
 }
 
-std::string sentence(const std::string& what, const std::string& reason) {
+std::string sentence_with_reason(const std::string& what, const std::string& reason) {
   return what + ": " + reason + ".";
 }
 
@@ -110,7 +110,7 @@ std::string percent_change(const std::optional<double>& log_ratio) {
 
 std::string learning_note(const std::string& who, const TTest& test,
                           const std::optional<double>& mean) {
-  if (!mean) return sentence(who, test.undefined);
+  if (!mean) return sentence_with_reason(who, test.undefined);
   std::string text = who + ": " + percent_change(mean) + " of time per 100 trials";
   if (test.log_ratio_ci95) {
     text += " (95 % interval " + percent_change(test.log_ratio_ci95->low) + " to " +
@@ -635,15 +635,15 @@ Table anova_table(const Analysis& analysis) {
       "Participants with a time in every cell. Generalised η²: SS / (SS + SS of "
       "participants + all error SS). W: Mauchly; GG: Greenhouse and Geisser; HF: Huynh and Feldt."};
   if (!anova.undefined.empty()) {
-    table.notes.push_back(sentence("Undefined", anova.undefined));
+    table.notes.push_back(sentence_with_reason("Undefined", anova.undefined));
     return table;
   }
   for (const AnovaEffect& effect : anova.effects) {
     if (!effect.undefined.empty()) {
-      table.notes.push_back(sentence("Undefined for " + effect.name, effect.undefined));
+      table.notes.push_back(sentence_with_reason("Undefined for " + effect.name, effect.undefined));
     } else if (!effect.sphericity.undefined.empty() && effect.num_df.value_or(0) > 1) {
-      table.notes.push_back(
-          sentence("Sphericity of " + effect.name + ", undefined", effect.sphericity.undefined));
+      table.notes.push_back(sentence_with_reason("Sphericity of " + effect.name + ", undefined",
+                                                 effect.sphericity.undefined));
     }
   }
   if (!anova.dropped.empty()) {
@@ -664,7 +664,7 @@ Table shape_slope_table(const Analysis& analysis) {
       {"reduction", "95 % interval", difference_name(first.pair), "se", "df", "t", "p",
        "p (Holm)"});
   if (!model.undefined.empty()) {
-    table.notes = {sentence("Not fitted", model.undefined)};
+    table.notes = {sentence_with_reason("Not fitted", model.undefined)};
     return table;
   }
   Reasons reasons;
@@ -685,7 +685,8 @@ Table shape_slope_table(const Analysis& analysis) {
                         fixed(model.shape_level_sd, 3) + ", gains " +
                         fixed(model.shape_gain_sd, 3) + "; residual " +
                         fixed(model.residual_sd, 3) + " (log s). df: Satterthwaite.");
-  for (const std::string& one : model.taken_out) table.notes.push_back(sentence("Taken out", one));
+  for (const std::string& one : model.taken_out)
+    table.notes.push_back(sentence_with_reason("Taken out", one));
   reasons.put(table.notes);
   return table;
 }
@@ -718,7 +719,7 @@ Table mixed_model_table(const Analysis& analysis) {
     }
   }
   if (!model.undefined.empty()) {
-    table.notes.push_back(sentence("Undefined", model.undefined));
+    table.notes.push_back(sentence_with_reason("Undefined", model.undefined));
     return table;
   }
   // Where the next model stands, it tells what this one leaves out.
@@ -732,7 +733,8 @@ Table mixed_model_table(const Analysis& analysis) {
             "Satterthwaite.");
   if (!model.singular.empty()) {
     table.notes.push_back(
-        sentence("Singular fit, on the boundary of the parameter space", model.singular) +
+        sentence_with_reason("Singular fit, on the boundary of the parameter space",
+                             model.singular) +
         " Interpret its intervals and p with caution.");
   }
   table.notes.push_back(random_effects_note(model, analysis.table.renderers));

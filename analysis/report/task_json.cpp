@@ -21,15 +21,17 @@ namespace {
 
 using TaskJson = nlohmann::ordered_json;
 
-TaskJson finite(double value) { return std::isfinite(value) ? TaskJson(value) : TaskJson(nullptr); }
+TaskJson finite_number(double value) {
+  return std::isfinite(value) ? TaskJson(value) : TaskJson(nullptr);
+}
 
 TaskJson maybe(const std::optional<double>& value) {
-  return value ? finite(*value) : TaskJson(nullptr);
+  return value ? finite_number(*value) : TaskJson(nullptr);
 }
 
 TaskJson ends_json(const std::optional<Interval>& interval) {
   if (!interval) return nullptr;
-  return {finite(interval->low), finite(interval->high)};
+  return {finite_number(interval->low), finite_number(interval->high)};
 }
 
 /// Word for it in protocols.
@@ -37,14 +39,14 @@ const char* easier_name(protocols::Easier easier) {
   return easier == protocols::Easier::higher ? "higher" : "lower";
 }
 
-void put_status(TaskJson& out, const std::string& undefined) {
+void put_task_status(TaskJson& out, const std::string& undefined) {
   out["status"] = undefined.empty() ? "ok" : "undefined";
   if (!undefined.empty()) out["reason"] = undefined;
 }
 
 TaskJson fit_json(const ParticipantFunction& one) {
   TaskJson fit;
-  put_status(fit, one.fit.undefined);
+  put_task_status(fit, one.fit.undefined);
   if (!one.fit.undefined.empty()) return fit;
   fit["function"] = to_string(one.model.function.shape);
   fit["scale"] = to_string(one.model.function.scale);
@@ -75,7 +77,7 @@ TaskJson fit_json(const ParticipantFunction& one) {
 
 TaskJson posterior_json(const PsychometricPosterior& posterior) {
   TaskJson out;
-  put_status(out, posterior.undefined);
+  put_task_status(out, posterior.undefined);
   if (!posterior.undefined.empty()) return out;
   out["threshold"] = posterior.mean.threshold;
   out["threshold_ci95"] = ends_json(posterior.threshold_ci95);
@@ -117,7 +119,7 @@ TaskJson function_json(const ParticipantFunction& one, int alternatives) {
         {"level", count.level}, {"trials", count.trials}, {"successes", count.successes}};
     if (alternatives > 0 && count.trials > 0) {
       const auto found = forced_choice_detectability(count.successes, count.trials, alternatives);
-      level["d_prime"] = finite(found.d_prime);
+      level["d_prime"] = finite_number(found.d_prime);
       level["d_prime_ci95"] = ends_json(found.d_prime_ci95);
     }
     out["levels"].push_back(std::move(level));
@@ -134,7 +136,7 @@ TaskJson function_json(const ParticipantFunction& one, int alternatives) {
     if (track.procedure) out["tracks"].back()["procedure"] = procedure_json(*track.procedure);
   }
   TaskJson detection;
-  put_status(detection, one.detectability.undefined);
+  put_task_status(detection, one.detectability.undefined);
   if (one.detectability.undefined.empty()) {
     detection["d_prime"] = maybe(one.detectability.d_prime);
     detection["d_prime_ci95"] = ends_json(one.detectability.d_prime_ci95);
@@ -158,7 +160,7 @@ TaskJson magnitude_json(const TaskCell& cell) {
                                    {"levels", TaskJson::array()}});
     for (const StevensLine::Point& point : line.points)
       out["participants"].back()["levels"].push_back(
-          {{"level", point.level}, {"geometric_mean", finite(point.magnitude)}});
+          {{"level", point.level}, {"geometric_mean", finite_number(point.magnitude)}});
   }
   for (const MagnitudeMean& one : cell.magnitude->means)
     out["levels"].push_back({{"level", one.level},
@@ -201,7 +203,7 @@ TaskJson ratings_json(const TaskCell& cell) {
     out["steps"].push_back({{"number", step.number},
                             {"label", step.label.empty() ? TaskJson() : TaskJson(step.label)},
                             {"n_ratings", step.count},
-                            {"share", finite(step.share)}});
+                            {"share", finite_number(step.share)}});
   out["all"] = ratings.spread.ratings > 0 ? spread_json(ratings.spread) : TaskJson();
   out["mean_of_participants"] = mean_json(ratings.mean);
   out["participants"] = rated_participants_json(ratings.participants, cell);
@@ -215,7 +217,7 @@ TaskJson ratings_json(const TaskCell& cell) {
 
 TaskJson wilcoxon_json(const Wilcoxon& ranks) {
   TaskJson out;
-  put_status(out, ranks.undefined);
+  put_task_status(out, ranks.undefined);
   out["V_positive_rank_sum"] = maybe(ranks.positive_rank_sum);
   out["n_nonzero"] = ranks.n_nonzero;
   out["p"] = maybe(ranks.p);
@@ -266,7 +268,7 @@ TaskJson reaches_json(const TaskCell& cell, const Reaches& one) {
 
 TaskJson misfit_json(const FieldMisfit& misfit) {
   TaskJson out;
-  put_status(out, misfit.undefined);
+  put_task_status(out, misfit.undefined);
   if (!misfit.undefined.empty()) return out;
   out["deviance"] = misfit.deviance;
   out["df"] = misfit.df;
@@ -274,17 +276,17 @@ TaskJson misfit_json(const FieldMisfit& misfit) {
   for (const FieldMisfit::Place& place : misfit.places)
     out["places"].push_back({{"at", place.at},
                              {"n_trials", place.trials},
-                             {"free", finite(place.free)},
-                             {"fitted", finite(place.fitted)}});
+                             {"free", finite_number(place.free)},
+                             {"fitted", finite_number(place.fitted)}});
   return out;
 }
 
 TaskJson field_participant_json(const ParticipantField& one) {
   TaskJson out{{"participant_id", one.participant}, {"n_trials", one.fit.trials}};
-  put_status(out, one.fit.undefined);
+  put_task_status(out, one.fit.undefined);
   if (!one.fit.undefined.empty()) return out;
   const auto put = [&](TaskJson& place, const FieldParameter& parameter) {
-    place = {{"estimate", finite(parameter.value)},
+    place = {{"estimate", finite_number(parameter.value)},
              {"ci95", ends_json(parameter.ci95)},
              {"determined", parameter.closed}};
   };
@@ -303,7 +305,7 @@ TaskJson field_json(const FieldAnalysis& field) {
   TaskJson out{{"dimensions", TaskJson::array()}};
   for (const FieldAnalysis::Dimension& one : field.dimensions)
     out["dimensions"].push_back({{"name", one.name}, {"unit", one.unit}});
-  put_status(out, field.undefined);
+  put_task_status(out, field.undefined);
   if (!field.undefined.empty()) return out;
   out["form"] = to_string(field.function.form);
   out["participants"] = TaskJson::array();
@@ -357,7 +359,7 @@ TaskJson cell_json(const TaskCell& cell) {
   for (const Reaches& one : cell.reaches) out["reaches"].push_back(reaches_json(cell, one));
   if (cell.information) {
     TaskJson& bits = out["information_transfer"] = information_json(*cell.information);
-    bits["most_bits"] = finite(cell.information_most);
+    bits["most_bits"] = finite_number(cell.information_most);
     bits["mean_of_participants_bits_corrected"] = maybe(cell.information_mean.mean);
     bits["mean_of_participants_ci95"] = ends_json(cell.information_mean.ci95);
     if (!cell.information_mean.undefined.empty())
@@ -369,7 +371,7 @@ TaskJson cell_json(const TaskCell& cell) {
     }
   }
   TaskJson confidence;
-  put_status(confidence, cell.confidence.undefined);
+  put_task_status(confidence, cell.confidence.undefined);
   if (cell.confidence.area) {
     confidence["type2_roc_area"] = *cell.confidence.area;
     confidence["ci95"] = ends_json(cell.confidence.area_ci95);
@@ -401,7 +403,7 @@ TaskJson group_json(const TaskGroup& group) {
                       {"participants", TaskJson::array()}};
     for (const NamedFigure& figure : one.participants)
       renderer["participants"].push_back(
-          {{"participant_id", figure.participant}, {"value", finite(figure.value)}});
+          {{"participant_id", figure.participant}, {"value", finite_number(figure.value)}});
     out["renderers"].push_back(std::move(renderer));
   }
   return out;
@@ -427,14 +429,14 @@ TaskJson comparison_json(const TaskComparison& one, bool of_renderers) {
   out["reference"] = one.conditions[0];
   out["natural_logarithms"] = one.logarithms;
   out["n_undetermined"] = one.n_undetermined;
-  put_status(out, one.comparison.undefined);
+  put_task_status(out, one.comparison.undefined);
   out["participant_sd"] = maybe(one.comparison.participant_sd);
   out["residual_sd"] = maybe(one.comparison.residual_sd);
   if (!one.comparison.differences.empty()) out["n_tests"] = one.n_tests;
   for (const ConditionDifference& difference : one.comparison.differences) {
     out["differences"].push_back({{condition, one.conditions[difference.condition]},
                                   {"n_pairs", difference.n_pairs},
-                                  {"mean", finite(difference.mean)},
+                                  {"mean", finite_number(difference.mean)},
                                   {"ci95", ends_json(difference.t_test.log_ratio_ci95)},
                                   {"t", maybe(difference.t_test.t)},
                                   {"df", maybe(difference.t_test.df)},
@@ -524,19 +526,20 @@ void put_comparison(const TaskComparison& one, const ConditionDifference& differ
   const PairedEvidence evidence = evidence_of(difference.mean, difference.t_test);
   const auto& ends = difference.t_test.log_ratio_ci95;
   const auto end = [&](const std::optional<Interval>& of, bool low) {
-    return of ? finite(back(low ? of->low : of->high)) : TaskJson(nullptr);
+    return of ? finite_number(back(low ? of->low : of->high)) : TaskJson(nullptr);
   };
-  place(out).update({{one.logarithms ? "ratio" : "difference", finite(back(difference.mean))},
-                     {"ci95_low", end(ends, true)},
-                     {"ci95_high", end(ends, false)},
-                     {"ci90_low", end(evidence.ci90, true)},
-                     {"ci90_high", end(evidence.ci90, false)},
-                     {"t", maybe(difference.t_test.t)},
-                     {"p", maybe(difference.t_test.p)},
-                     {"p_holm", maybe(difference.t_test.p_holm)},
-                     {"wilcoxon_p", maybe(difference.wilcoxon.p)},
-                     {"bf10", maybe(evidence.bayes_factor)},
-                     {"n", difference.n_pairs}});
+  place(out).update(
+      {{one.logarithms ? "ratio" : "difference", finite_number(back(difference.mean))},
+       {"ci95_low", end(ends, true)},
+       {"ci95_high", end(ends, false)},
+       {"ci90_low", end(evidence.ci90, true)},
+       {"ci90_high", end(evidence.ci90, false)},
+       {"t", maybe(difference.t_test.t)},
+       {"p", maybe(difference.t_test.p)},
+       {"p_holm", maybe(difference.t_test.p_holm)},
+       {"wilcoxon_p", maybe(difference.wilcoxon.p)},
+       {"bf10", maybe(evidence.bayes_factor)},
+       {"n", difference.n_pairs}});
   place(out["equivalence"])["least_bound"] = maybe(evidence.least_bound);
 }
 
@@ -578,17 +581,17 @@ void put_conditions(const StudyAnalysis& analysis, TaskJson& out) {
 }
 
 /// The group's values without a model: means of exponents, ratings and settings.
-void put_means(const StudyAnalysis& analysis, TaskJson& out) {
+void put_renderer_means(const StudyAnalysis& analysis, TaskJson& out) {
   for (const TaskGroup& group : analysis.groups) {
     for (const GroupMean& one : group.renderers) {
       if (one.of_model || !one.mean) continue;
       const auto end = [&](bool low) {
-        return one.ci95 ? finite(low ? one.ci95->low : one.ci95->high) : TaskJson(nullptr);
+        return one.ci95 ? finite_number(low ? one.ci95->low : one.ci95->high) : TaskJson(nullptr);
       };
       TaskJson& place = named_place(out, analysis, group.measure, group.task, group.block_name,
                                     group.shape)[one.renderer];
       if (place.is_null())
-        place = {{"estimate", finite(*one.mean)},
+        place = {{"estimate", finite_number(*one.mean)},
                  {"ci95_low", end(true)},
                  {"ci95_high", end(false)},
                  {"n", one.participants.size()}};
@@ -643,7 +646,7 @@ TaskJson named_json(const StudyAnalysis& analysis) {
     }
   }
   put_conditions(analysis, out);
-  put_means(analysis, out);
+  put_renderer_means(analysis, out);
   return out;
 }
 

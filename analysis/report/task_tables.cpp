@@ -366,7 +366,7 @@ std::string finding_on_means(const StudyAnalysis& analysis) {
   return text;
 }
 
-std::string cell_name(const TaskCell& cell) {
+std::string name_of_cell(const TaskCell& cell) {
   return stimulus_of(cell.task, cell.block_name, cell.shape) +
          (cell.renderer.empty() ? "" : ", " + printable(cell.renderer));
 }
@@ -374,7 +374,7 @@ std::string cell_name(const TaskCell& cell) {
 Table table_of(const TaskCell& cell, const std::string& what, const std::string& label,
                std::vector<std::string> header, std::size_t names = 1) {
   Table table;
-  table.caption = labelled(what + ": " + cell_name(cell), label);
+  table.caption = labelled(what + ": " + name_of_cell(cell), label);
   table.header = std::move(header);
   table.n_names = names;
   return table;

@@ -321,11 +321,12 @@ FieldParameter profiled_rate(const FieldLikelihood& likelihood, const std::vecto
 /// at the least standard: the search has bounds there.
 void open_flat_ends(const FieldScales& scales, const std::vector<double>& best,
                     std::vector<FieldParameter>& parameters) {
-  constexpr double kFlat = 0.02;
+  constexpr double kLevel = 0.02;
   FieldParameter &w = parameters[0], &c = parameters[1];
   const double least_w =
-      kFlat * std::abs(protocols::field_jnd(FieldForm::weber, best, scales.middle) / scales.middle);
-  const double most_c = scales.middle / kFlat;
+      kLevel *
+      std::abs(protocols::field_jnd(FieldForm::weber, best, scales.middle) / scales.middle);
+  const double most_c = scales.middle / kLevel;
   if (w.ci95.low < least_w) {
     w.ci95.low = 0;
     w.closed = false;

@@ -248,7 +248,7 @@ double greatest_distance(const std::vector<std::vector<GroupAnswers>>& answers, 
   return most;
 }
 
-GroupAxis log_axis(double range, std::size_t points, double floor) {
+GroupAxis log_points(double range, std::size_t points, double floor) {
   return {std::log(range / 200), std::log(2 * range), points, floor, 1.5};
 }
 
@@ -256,9 +256,9 @@ Axes axes_of(double low, double high, double most_distance, const GroupPsychomet
              const GroupGrid& grid) {
   const double range = high - low;
   Axes axes;
-  axes.width = log_axis(range, grid.widths, grid.width_floor);
+  axes.width = log_points(range, grid.widths, grid.width_floor);
   if (model.standard) {
-    axes.location = log_axis(most_distance, grid.locations, grid.width_floor);
+    axes.location = log_points(most_distance, grid.locations, grid.width_floor);
     return axes;
   }
   axes.location = {low - grid.beyond * range, high + grid.beyond * range, grid.locations,

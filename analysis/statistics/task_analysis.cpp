@@ -284,8 +284,8 @@ LevelFigures distance_from_standard(const PsychometricFit& fit, const Psychometr
   return figures;
 }
 
-LevelFigures figures_of(const PsychometricFit& fit, const PsychometricModel& model,
-                        const TaskCell& cell) {
+LevelFigures fitted_figures(const PsychometricFit& fit, const PsychometricModel& model,
+                            const TaskCell& cell) {
   if (cell.task == "detect" || cell.same_different) return {};
   if (cell.forced_choice) return distance_from_standard(fit, model, cell.standard_level);
   const Discrimination found = discrimination(fit, model.function, cell.standard_level);
@@ -380,7 +380,7 @@ ParticipantFunction function_of(const std::string& participant, const Trials& tr
   if (result.fit.undefined.empty()) {
     result.goodness = goodness_of_fit(counts, result.model, result.fit,
                                       context.settings.simulations, context.settings.seed);
-    result.figures = figures_of(result.fit, result.model, cell);
+    result.figures = fitted_figures(result.fit, result.model, cell);
     add_fitted_levels(result.tracks, result.model, result.fit);
     const double threshold = result.fit.parameters.threshold;
     const Interval& ends = result.fit.threshold_ci95;

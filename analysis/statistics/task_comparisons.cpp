@@ -356,7 +356,7 @@ std::optional<TaskGroup> group_of(const std::vector<const TaskCell*>& cells,
   return result;
 }
 
-std::size_t number_of_tests(const TaskComparison& one) {
+std::size_t tests_of(const TaskComparison& one) {
   return static_cast<std::size_t>(std::ranges::count_if(
       one.comparison.differences,
       [](const ConditionDifference& difference) { return difference.t_test.p.has_value(); }));
@@ -389,7 +389,7 @@ std::optional<TaskComparison> compared(const std::vector<const TaskCell*>& cells
     for (ParticipantFigure& figure : all) figure.value = std::log(figure.value);
   }
   result.comparison = compare_thresholds(all, result.conditions.size());
-  result.n_tests = number_of_tests(result);
+  result.n_tests = tests_of(result);
   return result;
 }
 

@@ -154,7 +154,7 @@ std::vector<GroupMeasure> measures_of(const GroupTask& task) {
   return out;
 }
 
-std::string listed(const std::vector<std::string>& names) {
+std::string listed_names(const std::vector<std::string>& names) {
   std::string text;
   for (const std::string& name : names) text += (text.empty() ? "" : ", ") + printable(name);
   return text;
@@ -187,7 +187,7 @@ void put_notes(const GroupTask& task, std::size_t c, GroupCoordinate coordinate,
   if (row.measure == "jnd" && !task.model.standard &&
       std::exp(moments.mean) < task.data.least_spacing / 2)
     note("levels too coarse for the JND: it may be too large");
-  if (!task.no_answers[c].empty()) note("no trials: " + listed(task.no_answers[c]));
+  if (!task.no_answers[c].empty()) note("no trials: " + listed_names(task.no_answers[c]));
   if (task.reversed[c] > 0)
     note(counted(task.reversed[c], "participant", "participants") +
          " with reversed answers left out");

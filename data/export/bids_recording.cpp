@@ -115,7 +115,7 @@ constexpr double kLongestGap = 60;  // s
 const Column kTrialOfSample{"trial", "Trial within the session, from 1, to which the tick belongs",
                             "1"};
 
-std::vector<Column> columns_of(const StudyLabel& study, bool contacts) {
+std::vector<Column> recording_columns(const StudyLabel& study, bool contacts) {
   std::vector<Column> all{kTrialOfSample};
   for (const Column& column : dataset_form(study.facts).intervals) all.push_back(column);
   all.insert(all.end(), sample_columns().begin(), sample_columns().end());
@@ -273,7 +273,7 @@ BidsRecording::BidsRecording(const StoredTrial& first, const StudyLabel& study,
       settings_(settings),
       run_(first.run),
       simulated_(first.participant.simulated),
-      columns_(columns_of(study, settings.contacts != nullptr)),
+      columns_(recording_columns(study, settings.contacts != nullptr)),
       begin_ns_(to_unix_ns(first.run.clock, first_onset_ns(first.record))) {}
 
 std::optional<std::int64_t> BidsRecording::slot_of(std::int64_t unix_ns) const {

@@ -40,7 +40,7 @@ const Column kSimulated{
     "",
     {{"0", "a person"}, {"1", "SIMULATED: not a person, or not a real device"}}};
 const Column kProtocol{"protocol_sha256", "SHA-256 of the protocol's text"};
-const Column kVersion{"program_version", "Version of palpate that recorded the trial"};
+const Column kProgramVersion{"program_version", "Version of palpate that recorded the trial"};
 const Column kNumber{"participant_number",
                      "Orders the counterbalancing; two stations may have given the same one", "1"};
 const Column kOrientation[] = {
@@ -88,7 +88,7 @@ std::vector<Column> make_trials() {
       {"missed_ticks", "Servo ticks that came too late", "1"},
       kAttempt,
       kProtocol,
-      kVersion,
+      kProgramVersion,
       kNumber,
       {"started_inside",
        "Whether the stylus was inside an object when forces went on",
@@ -289,7 +289,7 @@ std::vector<Column> make_attempts() {
           kDevice,
           kSimulated,
           kProtocol,
-          kVersion,
+          kProgramVersion,
           kNumber};
 }
 

@@ -22,7 +22,7 @@ using Json = nlohmann::ordered_json;
 const Column kTimeOfTick{"time", "Time of the tick, from the first tick with forces on", "s"};
 
 /// ". Values: 0 = no; 1 = yes." \param meanings value -> meaning; null: none
-std::string listed(const char* title, const Json& meanings) {
+std::string listed_meanings(const char* title, const Json& meanings) {
   if (meanings.is_null()) return "";
   std::string text = std::string(". ") + title + ":";
   for (const auto& [value, meaning] : meanings.items()) {
@@ -35,8 +35,9 @@ std::string listed(const char* title, const Json& meanings) {
 /// An entry of variableMeasured: https://schema.org/PropertyValue
 Json describe_variable(const Column& column, const ProtocolFacts& facts,
                        const std::vector<FaultMeaning>& fault_bits) {
-  const std::string text = column.description + listed("Values", column_levels(column, facts)) +
-                           listed("Bits", column_bits(column, fault_bits));
+  const std::string text = column.description +
+                           listed_meanings("Values", column_levels(column, facts)) +
+                           listed_meanings("Bits", column_bits(column, fault_bits));
   Json variable{{"@type", "PropertyValue"}, {"name", column.name}, {"description", text}};
   if (*column.unit != '\0') variable["unitText"] = unit_of(column, facts);
   return variable;

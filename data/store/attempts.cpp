@@ -32,12 +32,12 @@ namespace {
 
 constexpr int kZlibPlain = 3, kZlibWithBodies = 4;
 constexpr bool is_zstd(int packing) { return packing > kZlibWithBodies; }
-constexpr bool has_bodies(int packing) {
+constexpr bool packs_bodies(int packing) {
   return packing == kZlibWithBodies || packing == kSamplesPacking;
 }
 constexpr std::size_t bytes_a_sample(int packing) {
   return 4 + (packing > 1 ? 8 : 0) + 13 * 8 + 4 + (packing > 2 ? 2 * 8 + 6 * 8 + 3 : 0) +
-         (has_bodies(packing) ? 1 + 13 * 8 : 0);
+         (packs_bodies(packing) ? 1 + 13 * 8 : 0);
 }
 // Limits of the stored count, so that a damaged one cannot make the decoder allocate memory out of
 // proportion to the compressed bytes: at most a trial of an hour at the highest rate; beyond some
@@ -105,7 +105,7 @@ void visit_columns(int packing, Samples& samples, Bodies& bodies, Visitor&& visi
     column(
         [](auto& s) -> auto& { return s.faults; }, kByte);
   }
-  if (!has_bodies(packing)) return;
+  if (!packs_bodies(packing)) return;
   column(
       [](auto& s) -> auto& { return s.bodies; }, kByte);
   for (int i = 0; i < 3; ++i)
@@ -271,8 +271,6 @@ std::string uncompressed(const std::vector<unsigned char>& planes) {
   packed.resize(size);
   return packed;
 }
-
-constexpr int kSealsSince = 3;  // schema version
 
 AttemptState state_of(const std::string& text) {
   if (text == "completed") return AttemptState::completed;
@@ -723,7 +721,7 @@ RecordedSamples unpack_samples(const void* data, std::size_t size, std::int64_t 
   Planes planes(decoder_of(packing, data, size));
   RecordedSamples out;
   out.samples.resize(rows);
-  if (has_bodies(packing)) out.bodies.resize(rows);
+  if (packs_bodies(packing)) out.bodies.resize(rows);
   std::vector<std::uint64_t> column(rows);
   visit_columns(packing, out.samples, out.bodies, [&](auto& of, auto get, auto form) {
     using Field = decltype(form);

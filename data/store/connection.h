@@ -3,6 +3,7 @@
 
 #include <SQLiteCpp/Database.h>
 #include <SQLiteCpp/Transaction.h>
+#include <sqlite3.h>
 
 #include <cstdint>
 #include <optional>
@@ -17,6 +18,10 @@
 #include "data/store/writer_lock.h"
 
 namespace palpate::data {
+
+// A store belongs to one thread at a time: without SQLite's mutex every column is read faster.
+inline constexpr int kOpenRead = SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX;
+inline constexpr int kOpenWrite = SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX;
 
 struct Store::Impl {
   std::string path;  ///< as given; for messages

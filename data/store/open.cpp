@@ -102,9 +102,6 @@ namespace {
 constexpr const char* kInterrupted = "interrupted: the program or the machine stopped";
 
 constexpr int kBusyTimeoutMs = 5000;
-// A store belongs to one thread at a time: without SQLite's mutex every column is read faster.
-constexpr int kOpenRead = SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX;
-constexpr int kOpenWrite = SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX;
 
 /// This process is the only writer (WriterLock), so a run in state `running` belongs to a dead
 /// process.

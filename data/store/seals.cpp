@@ -17,11 +17,9 @@
 namespace palpate::data {
 namespace {
 
-constexpr int kVersion = 3;  // first version of the schema with seals
-
 /// Version of the schema: rows of an older database are sealed before migration adds columns.
 int version_of(SQLite::Database& db) {
-  int version = kVersion;
+  int version = kSealsSince;
   SQLite::Statement columns(db, "SELECT name FROM pragma_table_info('attempts')");
   while (columns.executeStep()) {
     const std::string name = columns.getColumn(0).getString();
@@ -101,7 +99,7 @@ const Link& SealWriter::last_of(std::int64_t session) {
     RowReader(find) >> link.position >> link.seal;
   } else {
     SealedValues whose;
-    put_session(whose, read_session_head(db_, session, kVersion));
+    put_session(whose, read_session_head(db_, session, kSealsSince));
     link.seal = whose.seal({});
   }
   return last_.emplace(session, link).first->second;
@@ -117,7 +115,7 @@ void SealWriter::seal(const char* update, std::int64_t session, std::int64_t id)
 }
 
 void SealWriter::run(std::int64_t id) {
-  SQLite::Statement find(db_, "SELECT r.session_id, " + run_columns(kVersion) +
+  SQLite::Statement find(db_, "SELECT r.session_id, " + run_columns(kSealsSince) +
                                   " FROM runs r JOIN sessions s ON s.id = r.session_id WHERE r.id "
                                   "= ?");
   Binder(find) << id;

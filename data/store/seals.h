@@ -41,6 +41,8 @@
 
 namespace palpate::data {
 
+inline constexpr int kSealsSince = 3;  ///< first version of the schema with them
+
 /// The values of a row, encoded for hashing.
 class SealedValues {
  public:

@@ -64,11 +64,11 @@ class SweepRowWriter {
   SQLite::Statement insert_, find_, seal_;
 };
 
-constexpr int kPlanColumns = 12;  // before its seal
+constexpr int kPlanValues = 12;  // before its seal
 
 using Objects = std::map<std::string, std::string>;  // name -> SQL
 
-constexpr int kSealsSince = 2;  // version
+constexpr int kSweepSealsSince = 2;  // version
 constexpr const char* kSealColumn = ", seal BLOB NOT NULL CHECK (length(seal) = 32)";
 constexpr const char* kSweepColumns =
     "CREATE TABLE sweep (protocol TEXT NOT NULL, files_sha256 TEXT NOT NULL, settings TEXT NOT "
@@ -89,7 +89,7 @@ std::string quoted(const std::string& name) {
 }
 
 std::string end_of_table(int version) {
-  return std::string(version < kSealsSince ? "" : kSealColumn) + ") STRICT";
+  return std::string(version < kSweepSealsSince ? "" : kSealColumn) + ") STRICT";
 }
 
 std::string sweep_table(int version) { return kSweepColumns + end_of_table(version); }
@@ -172,7 +172,7 @@ std::vector<std::string> names_of(const std::string& text) {
 Checksum seal_of_plan(SQLite::Statement& row) {
   SealedValues values;
   values.begin("sweep");
-  put_values(values, row, kPlanColumns);
+  put_values(values, row, kPlanValues);
   return values.seal({});
 }
 
@@ -182,7 +182,8 @@ SweepTables tables_of(SQLite::Database& db, const std::string& path, int version
   SweepTables tables;
   tables.version = version;
   tables.seal = seal_of_plan(find);
-  if (version >= kSealsSince && stored_seal(find) != tables.seal) refuse_seal(path, "the plan");
+  if (version >= kSweepSealsSince && stored_seal(find) != tables.seal)
+    refuse_seal(path, "the plan");
   SweepPlan& plan = tables.plan;
   std::string seed, parameters, shapes, renderers;
   RowReader(find) >> plan.protocol >> plan.files_sha256 >> plan.settings >> plan.space >>
@@ -234,7 +235,7 @@ Checksum seal_of_row(SQLite::Statement& row, const SweepTables& tables) {
 
 /// Verifies the row's seal. \throws StoreRefused, naming the row
 void require_sealed(SQLite::Statement& row, const SweepTables& tables, const std::string& path) {
-  if (tables.version < kSealsSince || stored_seal(row) == seal_of_row(row, tables)) return;
+  if (tables.version < kSweepSealsSince || stored_seal(row) == seal_of_row(row, tables)) return;
   refuse_seal(path, "point " + std::to_string(row.getColumn(0).getInt64()));
 }
 
@@ -264,7 +265,7 @@ SweepTables read_sweep_tables(SQLite::Database& db, const std::string& path) {
   if (check.executeStep() && check.getColumn(0).getString() != "ok") {
     throw SQLite::Exception(check.getColumn(0).getString(), SQLITE_CORRUPT);
   }
-  if (version < kSealsSince) return tables;
+  if (version < kSweepSealsSince) return tables;
   SQLite::Statement row(db, "SELECT * FROM points");
   while (row.executeStep()) require_sealed(row, tables, path);
   return tables;
@@ -361,9 +362,8 @@ namespace fs = std::filesystem;
 
 // Wait for a reader in another program, such as an export, instead of ending a sweep of hours;
 // others wait for this writer likewise.
-constexpr int kBusyTimeoutMs = 60'000;
+constexpr int kLongTimeoutMs = 60'000;
 constexpr std::size_t kPageRows = 1000;  // rows read at a time
-constexpr int kOpenWrite = SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX;
 
 void sync_path(const std::string& path, const std::string& named) {
   const int opened = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
@@ -475,12 +475,11 @@ struct SweepFile::Impl {
     guarded(path, [&] {
       // Opening the file rolls back the journal of a killed process.
       if (writes || (one_name && ::access(file.c_str(), W_OK) == 0)) {
-        db.emplace(file, kOpenWrite, kBusyTimeoutMs);
+        db.emplace(file, kOpenWrite, kLongTimeoutMs);
       } else if (fs::exists(file + "-journal")) {
-        db.emplace(file, SQLITE_OPEN_READONLY | SQLITE_OPEN_NOMUTEX, kBusyTimeoutMs);
+        db.emplace(file, kOpenRead, kLongTimeoutMs);
       } else {
-        db.emplace(immutable_uri(file),
-                   SQLITE_OPEN_READONLY | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX, kBusyTimeoutMs);
+        db.emplace(immutable_uri(file), kOpenRead | SQLITE_OPEN_URI, kLongTimeoutMs);
       }
       db->exec("PRAGMA trusted_schema = OFF; PRAGMA cell_size_check = ON");
       db->exec(writes ? "PRAGMA journal_mode = DELETE; PRAGMA synchronous = FULL"
@@ -614,7 +613,7 @@ struct SweepCopy::Impl {
   void begin() {
     make_empty_file(path);
     guarded(path, [&] {
-      db.emplace(path, kOpenWrite, kBusyTimeoutMs);
+      db.emplace(path, kOpenWrite, kLongTimeoutMs);
       // A temporary file, deleted if anything fails: needs no journal. One transaction for all
       // sources: the header counts transactions.
       db->exec("PRAGMA page_size = 4096; PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF");
@@ -677,7 +676,7 @@ std::pair<std::int64_t, std::int64_t> SweepCopy::finish() {
       ordered.finish();
     }
     fs::remove(shuffled);
-    impl.db.emplace(impl.path, kOpenWrite, kBusyTimeoutMs);
+    impl.db.emplace(impl.path, kOpenWrite, kLongTimeoutMs);
   }
   const std::pair<std::int64_t, std::int64_t> counts{
       impl.db->execAndGet("SELECT count(*) FROM points").getInt64(),

@@ -39,7 +39,7 @@ bool is_catch_trial(const Protocol& protocol, int participant, std::uint64_t blo
 }
 
 /// The number of a block's cells that stand apart, from index `first` on; 1: none do.
-int cells_of(const Protocol& protocol, int first) {
+int cells_from(const Protocol& protocol, int first) {
   const auto begin = protocol.blocks.begin() + first;
   return static_cast<int>(std::find_if(begin + 1, protocol.blocks.end(),
                                        [&](const TaskBlock& block) {
@@ -67,7 +67,7 @@ SquareRows square_rows(const Protocol& protocol) {
   std::map<int, int> blocks;  // by session
   for (int i = 0; i < static_cast<int>(protocol.blocks.size());) {
     const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(i)];
-    const int cells = cells_of(protocol, i);
+    const int cells = cells_from(protocol, i);
     out.cells = std::lcm(out.cells, latin_square_rows(cells));
     if (!block.practice) ++blocks[block.session];
     i += cells;
@@ -88,7 +88,7 @@ std::vector<int> blocks_in_order(const Protocol& protocol, int participant_numbe
   int crossed = 0;  // blocks whose cells stand apart
   for (int i = 0; i < static_cast<int>(protocol.blocks.size());) {
     const TaskBlock& block = protocol.blocks[static_cast<std::size_t>(i)];
-    const int cells = cells_of(protocol, i);
+    const int cells = cells_from(protocol, i);
     if (block.session == session) {
       for (const int cell : latin_square_row(cells, rows.of_cells(number, crossed)))
         units.back().push_back(i + cell);

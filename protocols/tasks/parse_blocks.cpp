@@ -553,7 +553,7 @@ void read_time_window(ObjectReader& reader, ReachingSpec& reaching) {
   reaching.most_time = most;
 }
 
-void read_reach(ObjectReader& reader, TaskBlock& block) {
+void read_reach_task(ObjectReader& reader, TaskBlock& block) {
   constexpr NumberRange kChannel{50, 20000, "N/m"};
   ReachingSpec& reaching = block.reaching.emplace();
   reader.vector("home_m", reaching.home, kPlace);
@@ -607,7 +607,7 @@ void read_task_keys(ObjectReader& reader, const Protocol& protocol, TaskBlock& b
       read_external(reader, protocol, block);
       break;
     case TaskKind::reach:
-      read_reach(reader, block);
+      read_reach_task(reader, block);
       break;
   }
 }

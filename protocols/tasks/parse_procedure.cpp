@@ -24,11 +24,11 @@ constexpr NumberRange kStep{0, 1e9, "", true};
 constexpr NumberRange kTrials{1, 10000};
 constexpr NumberRange kRun{1, 10};
 constexpr NumberRange kShare{0, 1};
-constexpr std::size_t kMostLevels = 1000;
+constexpr std::size_t kMostListed = 1000;
 constexpr std::size_t kMaxTracks = 16;
 constexpr double kMostSeriesLevels = 1000;
 // 32 MB of tables and some ms a trial; Watson's examples need a tenth.
-constexpr double kMostCells = 4e6;
+constexpr double kMostGridCells = 4e6;
 
 const NumberRange& level_range(LevelScale scale) {
   return scale == LevelScale::linear ? kAnyLevel : kPositiveLevel;
@@ -61,7 +61,7 @@ std::vector<std::vector<double>> read_product(ObjectReader& reader, const Dimens
       [&](ObjectReader& grid) {
         for (const LevelDimension& one : dimensions)
           levels.push_back(read_grid_values(
-              grid, one.name.c_str(), {level_range(one.scale), kMostLevels, Presence::required}));
+              grid, one.name.c_str(), {level_range(one.scale), kMostListed, Presence::required}));
       },
       Presence::required);
   std::size_t size = levels.empty() ? 0 : 1;
@@ -81,7 +81,7 @@ std::vector<std::vector<double>> read_product(ObjectReader& reader, const Dimens
 /// A list of points, each a list of numbers in the order of the dimensions.
 std::vector<LevelPoint> read_points(ObjectReader& reader, const Dimensions& dimensions) {
   std::vector<LevelPoint> points;
-  const json* const list = reader.array("levels", 1, kMostLevels, Presence::required);
+  const json* const list = reader.array("levels", 1, kMostListed, Presence::required);
   if (list == nullptr) return points;
   for (std::size_t i = 0; i < list->size(); ++i) {
     const std::string place = child_pointer(reader.pointer("levels"), i);
@@ -112,7 +112,7 @@ ConstantStimuli read_constant_points(ObjectReader& reader, const Dimensions& dim
                         "expected levels (a list of points) or grid (values of each dimension: " +
                             names_of(dimensions) + "), one of both");
   } else if (reader.has("grid")) {
-    const auto levels = read_product(reader, dimensions, kMostLevels);
+    const auto levels = read_product(reader, dimensions, kMostListed);
     if (!levels.empty()) spec.points = product_of(levels);
   } else {
     spec.points = read_points(reader, dimensions);
@@ -124,7 +124,7 @@ ConstantStimuli read_constant_points(ObjectReader& reader, const Dimensions& dim
 ConstantStimuli read_constant(ObjectReader& reader, const Dimensions& dimensions) {
   if (!dimensions.empty()) return read_constant_points(reader, dimensions);
   ConstantStimuli spec;
-  const GridLimits limits{kAnyLevel, kMostLevels, Presence::required};
+  const GridLimits limits{kAnyLevel, kMostListed, Presence::required};
   spec.levels = read_grid_values(reader, "levels", limits);
   reader.integer("repetitions", spec.repetitions, kTrials, Presence::required);
   return spec;
@@ -221,7 +221,7 @@ void check_quest(ObjectReader& reader, const QuestPlus& spec) {
   const double parameters =
       size(spec.threshold) * size(spec.slope) * size(spec.guess) * size(spec.lapse);
   const double cells = parameters * static_cast<double>(spec.levels.size());
-  if (cells > kMostCells) {
+  if (cells > kMostGridCells) {
     faults.add(reader.pointer("threshold"),
                "expected at most 4000000 combinations of level and parameters; these grids have " +
                    std::to_string(static_cast<long long>(cells)));
@@ -243,18 +243,18 @@ QuestPlus read_quest(ObjectReader& reader) {
   read_scale(reader, spec.function.scale);
   read_easier(reader, spec.function.easier);
   const NumberRange& range = level_range(spec.function.scale);
-  spec.levels = read_grid_values(reader, "levels", {range, kMostLevels, Presence::required});
-  spec.threshold = read_grid(reader, "threshold", {range, kMostLevels, Presence::required});
-  spec.slope = read_grid(reader, "slope", {kStep, kMostLevels, Presence::required});
-  spec.guess = read_grid(reader, "guess", {kShare, kMostLevels, Presence::required});
-  spec.lapse = read_grid(reader, "lapse", {kShare, kMostLevels});
+  spec.levels = read_grid_values(reader, "levels", {range, kMostListed, Presence::required});
+  spec.threshold = read_grid(reader, "threshold", {range, kMostListed, Presence::required});
+  spec.slope = read_grid(reader, "slope", {kStep, kMostListed, Presence::required});
+  spec.guess = read_grid(reader, "guess", {kShare, kMostListed, Presence::required});
+  spec.lapse = read_grid(reader, "lapse", {kShare, kMostListed});
   if (!reader.has("lapse")) spec.lapse.values = {0.02};
   read_quest_stop(reader, spec);
   check_quest(reader, spec);
   return spec;
 }
 
-constexpr std::size_t kMostPoints = 4096;
+constexpr std::size_t kMostProductLevels = 4096;
 
 /// The dimension that a key of the function names; `usual` without the key.
 void read_place(ObjectReader& function, const char* key, const Dimensions& dimensions,
@@ -414,7 +414,7 @@ void check_size(ObjectReader& reader, const FieldQuestPlus& spec) {
     parameters *= static_cast<double>(grid.values.size());
   for (const auto& values : spec.levels) points *= static_cast<double>(values.size());
   const auto whole = [](double value) { return std::to_string(static_cast<long long>(value)); };
-  if (points * parameters > kMostCells)
+  if (points * parameters > kMostGridCells)
     reader.faults().add(reader.pointer("grid"),
                         "expected at most 4000000 combinations of point and parameters; " +
                             whole(points) + " points x " + whole(parameters) + " parameters are " +
@@ -440,7 +440,7 @@ FieldQuestPlus read_field_quest(ObjectReader& reader, const Dimensions& dimensio
   }
   const bool has_form = function != nullptr && reader.faults().count() == before;
   read_easier(reader, spec.function.easier);
-  spec.levels = read_product(reader, dimensions, kMostPoints);
+  spec.levels = read_product(reader, dimensions, kMostProductLevels);
   if (!has_form) {  // it determines the other keys
     for (const char* const key :
          {"w", "c", "a", "b", "s", "slope", "guess", "lapse", "interest", "stop"})
@@ -451,7 +451,7 @@ FieldQuestPlus read_field_quest(ObjectReader& reader, const Dimensions& dimensio
   for (const std::string& name : names) {
     const bool lapse = name == "lapse";
     spec.parameters.push_back(read_grid(reader, name.c_str(),
-                                        {parameter_range(spec.function.form, name), kMostLevels,
+                                        {parameter_range(spec.function.form, name), kMostListed,
                                          lapse ? Presence::optional : Presence::required}));
     if (lapse && !reader.has("lapse")) spec.parameters.back().values = {0.02};
   }

@@ -14,9 +14,9 @@ constexpr double kNotch = 0.001;         // m
 constexpr double kNotchPlane = 0.004;    // m
 constexpr double kFirstPress = 0.0015;   // m; about 1 N at the usual stiffness
 constexpr double kPlaneDistance = 0.08;  // m, of the plane; outside the usual home zones
-constexpr double kMostPress = 0.03, kFarthest = 0.2;  // m
-constexpr double kDepthPerPixel = 0.0004;             // m
-constexpr double kTurnPerPixel = 0.006;               // rad
+constexpr double kMostPress = 0.03, kFarthestPlane = 0.2;  // m
+constexpr double kDepthPerPixel = 0.0004;                  // m
+constexpr double kTurnPerPixel = 0.006;                    // rad
 
 constexpr double kThickness = 1.6;  // the view is small beside the panels
 
@@ -72,7 +72,8 @@ void PointerControl::step(const PointerMotion& pointer, const Camera& camera,
   if (touches_) {
     press_depth_ = std::clamp(press_depth_ + kNotch * notches, 0.0, kMostPress);
   } else {
-    plane_distance_ = std::clamp(plane_distance_ - kNotchPlane * notches, -kFarthest, kFarthest);
+    plane_distance_ =
+        std::clamp(plane_distance_ - kNotchPlane * notches, -kFarthestPlane, kFarthestPlane);
   }
   if (pointer.orbit) {
     pointer_offset_ = pointer.at - camera.project(tip());

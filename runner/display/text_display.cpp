@@ -52,7 +52,7 @@ std::string_view trimmed(std::string_view text) {
   return text;
 }
 
-constexpr Page::Kind kText = Page::Kind::text;
+constexpr Page::Kind kShownText = Page::Kind::text;
 
 std::string text_of(const Page& page) {
   std::string text = printable_lines(page.text);
@@ -63,7 +63,7 @@ std::string text_of(const Page& page) {
   if (page.parts > 1)
     text += "\n[" + std::to_string(page.part) + " / " + std::to_string(page.parts) + "]";
   if (page.picture) text += "\n[a picture, which the window shows]";
-  if (page.kind == kText && page.keys.empty()) text += "\n[space bar: go on]";
+  if (page.kind == kShownText && page.keys.empty()) text += "\n[space bar: go on]";
   if (page.kind == Page::Kind::message && page.parts == 0 && page.typing == Page::Typing::none)
     return text;  // nothing to answer now
   if (!page.keys.empty() && page.kind != Page::Kind::neutral) text += "\n";
@@ -391,7 +391,7 @@ void TextScreen::show(const Page& page) {
   std::string text;
   if (page.kind != before.kind || page.text != before.text || page.go != before.go ||
       page.typing != before.typing || page.keys != before.keys ||
-      (page.keys.empty() && page.seconds_left > before.seconds_left) || page.kind == kText) {
+      (page.keys.empty() && page.seconds_left > before.seconds_left) || page.kind == kShownText) {
     text = text_of(page);
   } else if (page.typed != before.typed) {
     text = "> " + printable(page.typed);

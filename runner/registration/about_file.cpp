@@ -27,8 +27,8 @@ constexpr std::array kLicenses = {
     "CC-BY-ND-4.0", "CC-BY-NC-ND-4.0", "PDDL-1.0",     "ODC-By-1.0",   "ODbL-1.0"};
 
 /// Reads a line that is not empty.
-std::optional<std::string> read_line(const json& value, const std::string& place,
-                                     FaultList& faults) {
+std::optional<std::string> read_about_line(const json& value, const std::string& place,
+                                           FaultList& faults) {
   if (value.is_string()) {
     const auto& text = value.get_ref<const std::string&>();
     const bool controls =
@@ -43,11 +43,11 @@ std::optional<std::string> read_line(const json& value, const std::string& place
   return std::nullopt;
 }
 
-void read_line(ObjectReader& reader, const char* key, std::string& out,
-               Presence presence = Presence::optional) {
+void read_about_line(ObjectReader& reader, const char* key, std::string& out,
+                     Presence presence = Presence::optional) {
   const json* const value = reader.member(key, presence);
   if (value == nullptr) return;
-  if (const auto text = read_line(*value, reader.pointer(key), reader.faults())) out = *text;
+  if (const auto text = read_about_line(*value, reader.pointer(key), reader.faults())) out = *text;
 }
 
 std::vector<std::string> read_lines(ObjectReader& reader, const char* key) {
@@ -55,7 +55,8 @@ std::vector<std::string> read_lines(ObjectReader& reader, const char* key) {
   if (const json* const list = reader.array(key, 1, kMostEntries)) {
     for (std::size_t i = 0; i < list->size(); ++i) {
       const std::string place = child_pointer(reader.pointer(key), i);
-      if (const auto text = read_line((*list)[i], place, reader.faults())) out.push_back(*text);
+      if (const auto text = read_about_line((*list)[i], place, reader.faults()))
+        out.push_back(*text);
     }
   }
   return out;
@@ -117,10 +118,10 @@ std::vector<Entry> read_entries(ObjectReader& reader, const char* key, Presence 
     Entry& entry = out.emplace_back();
     if (value.is_object()) {
       ObjectReader inner(value, place, reader.faults());
-      read_line(inner, main, entry.*text, Presence::required);
+      read_about_line(inner, main, entry.*text, Presence::required);
       read_more(inner, entry);
       inner.refuse_unknown_keys();
-    } else if (const auto line = read_line(value, place, reader.faults())) {
+    } else if (const auto line = read_about_line(value, place, reader.faults())) {
       entry.*text = *line;
     }
   }
@@ -132,7 +133,7 @@ void read_authors(ObjectReader& reader, data::StudyAbout& about) {
       reader, "authors", Presence::required, "name", &data::StudyAuthor::name,
       [](ObjectReader& inner, data::StudyAuthor& author) {
         read_orcid(inner, author.orcid);
-        read_line(inner, "affiliation", author.affiliation);
+        read_about_line(inner, "affiliation", author.affiliation);
       });
   for (std::size_t i = 0; i < about.authors.size(); ++i)
     check_commas(about.authors[i].name, child_pointer("/authors", i), reader.faults());
@@ -171,13 +172,15 @@ data::StudyAbout read_about_text(const std::string& text, const std::string& fil
   read_license(reader, about.license);
   about.funding = read_entries<data::StudyFunding>(
       reader, "funding", Presence::optional, "funder", &data::StudyFunding::funder,
-      [](ObjectReader& inner, data::StudyFunding& one) { read_line(inner, "grant", one.grant); });
+      [](ObjectReader& inner, data::StudyFunding& one) {
+        read_about_line(inner, "grant", one.grant);
+      });
   about.ethics_approvals = read_lines(reader, "ethics_approvals");
   about.references = read_lines(reader, "references");
   static const std::regex doi(R"((doi:|https?://(?:dx\.)?doi\.org/)?(10\.\d{4,9}/[^\s]+))");
   read_pattern(reader, "doi", doi, "expected a DOI such as 10.5281/zenodo.1234", about.doi);
-  read_line(reader, "acknowledgements", about.acknowledgements);
-  read_line(reader, "how_to_acknowledge", about.how_to_acknowledge);
+  read_about_line(reader, "acknowledgements", about.acknowledgements);
+  read_about_line(reader, "how_to_acknowledge", about.how_to_acknowledge);
   reader.refuse_unknown_keys();
   faults.throw_if_any();
   return about;

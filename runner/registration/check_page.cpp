@@ -59,8 +59,8 @@ void put_hypothesis(const analysis::Hypothesis& one, const analysis::Judgement& 
 }
 
 /// The conditions of a hypothesis with its numbers.
-analysis::Table conditions_of(const analysis::Hypothesis& one, const analysis::Judgement& judgement,
-                              const std::string& label) {
+analysis::Table judged_conditions(const analysis::Hypothesis& one,
+                                  const analysis::Judgement& judgement, const std::string& label) {
   analysis::Table table;
   table.caption = one.id + ": " + analysis::to_string(judgement.verdict) +
                   (label.empty() ? "" : " (" + label + ")");
@@ -190,7 +190,7 @@ std::string check_html(const StudyCheck& check, const Registration& registered) 
   for (const auto& [one, judgement] : check.hypotheses) put_hypothesis(one, judgement, page.body());
   page.body() += "</ul>\n";
   for (const auto& [one, judgement] : check.hypotheses)
-    analysis::put_table(page.body(), conditions_of(one, judgement, check.label));
+    analysis::put_table(page.body(), judged_conditions(one, judgement, check.label));
   page.put_note(
       "Corroborated: the first condition holds and the second does not. Refuted: the second holds "
       "and the first does not. Else undecided. The conditions are the registered ones.");

@@ -113,7 +113,7 @@ protocols::Protocol stored_protocol(data::Store& store, const data::StoredTrial&
 
 /// Scales the materials down to the limits of the device of the trial's run. True: there were any
 /// limits.
-bool limit_as_recorded(protocols::Protocol& protocol, data::Store& store,
+bool limited_by_a_note(protocols::Protocol& protocol, data::Store& store,
                        const data::StoredTrial& trial) {
   for (const data::StoredNote& note : store.notes()) {
     const data::ClockStamp &noted = note.run_clock, &shown = trial.run.clock;
@@ -136,7 +136,7 @@ bool limit_as_recorded(protocols::Protocol& protocol, data::Store& store,
 protocols::Protocol protocol_as_shown(data::Store& store, const data::StoredTrial& trial,
                                       const std::string& mesh_folder, bool& limited) {
   protocols::Protocol protocol = stored_protocol(store, trial, mesh_folder);
-  limited = limit_as_recorded(protocol, store, trial);
+  limited = limited_by_a_note(protocol, store, trial);
   return protocol;
 }
 
@@ -157,7 +157,7 @@ RecordedTrial load_recorded_trial(data::Store& store, const data::TrialName& nam
                              "', which its protocol " + trial.stored.protocol_name +
                              " does not have; expected one of its stimuli");
   }
-  trial.limited = limit_as_recorded(trial.protocol, store, trial.stored);
+  trial.limited = limited_by_a_note(trial.protocol, store, trial.stored);
   return trial;
 }
 

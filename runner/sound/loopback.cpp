@@ -1,13 +1,13 @@
 #include "runner/sound/loopback.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <optional>
 #include <vector>
 
 #include "data/base/random.h"
+#include "runner/sound/steady_time.h"
 
 namespace palpate::runner::sound {
 namespace {
@@ -17,12 +17,6 @@ constexpr double kJitter = 0.01;                 // s
 constexpr double kOnset = 0.3;                   // of the loudest sample
 constexpr double kAboveNoise = 8;                // of the root mean square before
 constexpr double kLeastPeak = 1e-3;              // of full scale
-
-std::int64_t now_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(
-             std::chrono::steady_clock::now().time_since_epoch())
-      .count();
-}
 
 /// The recorded sound, and its time.
 class Heard {
@@ -71,7 +65,7 @@ class Heard {
 };
 
 /// At 1 m/s onto a plane.
-std::int64_t touch(servo::HeardTicks& ticks) {
+std::int64_t touch_once(servo::HeardTicks& ticks) {
   servo::HeardTick tick;
   constexpr std::int64_t kTick_ns = 1'000'000;
   tick.time_ns = now_ns() - kTick_ns;
@@ -98,7 +92,7 @@ LoopbackTiming measure_loopback(SoundPlayer& player, servo::HeardTicks& ticks, S
   for (; out.clicks < clicks; ++out.clicks) {
     Heard heard(input);
     heard.listen(kBefore + kJitter * random.unit());
-    const std::int64_t moment_ns = touch(ticks);
+    const std::int64_t moment_ns = touch_once(ticks);
     heard.listen(kAfter);
     if (const auto onset = heard.onset_after(static_cast<double>(moment_ns)))
       late.push_back(1e-9 * (*onset - static_cast<double>(moment_ns)));

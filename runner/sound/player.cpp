@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "runner/sound/noise_signal.h"
+#include "runner/sound/steady_time.h"
 
 namespace palpate::runner::sound {
 namespace {
@@ -21,11 +22,6 @@ constexpr SoundBuffer kQuick{64, 2}, kPatient{128, 4}, kUnhurried{256, 8};
 constexpr double kPace = 0.9;
 constexpr double kWaking = 0.0005;  // s, by which the thread may wake late
 constexpr double kTonesDb = -24;    // where a protocol has neither tones nor noise
-
-std::int64_t now_ns() {
-  return std::chrono::duration_cast<std::chrono::nanoseconds>(Clock::now().time_since_epoch())
-      .count();
-}
 
 std::int16_t to_sample(double value) {
   return static_cast<std::int16_t>(std::lround(32767 * std::clamp(value, -1.0, 1.0)));

@@ -44,7 +44,7 @@ sf_count_t write(const void*, sf_count_t, void*) { return 0; }
 
 sf_count_t tell(void* user) { return static_cast<const Bytes*>(user)->at; }
 
-struct Close {
+struct CloseFile {
   void operator()(SNDFILE* file) const { sf_close(file); }
 };
 
@@ -75,7 +75,7 @@ std::vector<double> read_sound_file(const std::string& bytes, const std::string&
   SF_VIRTUAL_IO io{length_of, seek, read, write, tell};
   Bytes source{bytes};
   SF_INFO info{};
-  const std::unique_ptr<SNDFILE, Close> file(sf_open_virtual(&io, SFM_READ, &info, &source));
+  const std::unique_ptr<SNDFILE, CloseFile> file(sf_open_virtual(&io, SFM_READ, &info, &source));
   if (!file) refuse(name, std::string("expected a WAV, FLAC or OGG file; ") + sf_strerror(nullptr));
   if (info.samplerate < 4000 || info.samplerate > 192000 || info.channels > 8)
     refuse(name, "expected 4000 to 192000 samples a second and at most 8 channels");

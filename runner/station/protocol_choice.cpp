@@ -24,7 +24,7 @@ std::string to_the_minute(std::int64_t utc_ns) {
   return text + " UTC";
 }
 
-const char* to_string(ProtocolChoice choice) {
+const char* word_for(ProtocolChoice choice) {
   switch (choice) {
     case ProtocolChoice::stored:
       return "stored";
@@ -126,7 +126,7 @@ std::string to_json_text(const ChangedProtocol& changed, ProtocolChoice choice) 
   const protocols::ProtocolDifference differs =
       protocols::difference(changed.earlier.info.text, changed.now.source_text);
   nlohmann::ordered_json what = {
-      {"shown", to_string(choice)},          {"stored_sha256", changed.earlier.info.sha256},
+      {"shown", word_for(choice)},           {"stored_sha256", changed.earlier.info.sha256},
       {"file_sha256", changed.now.sha256},   {"texts", differs.texts},
       {"stimuli_and_order", differs.design}, {"other_settings", differs.settings}};
   if (choice == ProtocolChoice::new_code) what["earlier_code"] = changed.code;

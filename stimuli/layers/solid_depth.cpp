@@ -13,7 +13,7 @@ namespace {
 /// Of the size: parts of a compound are placed by numbers of six digits or more.
 constexpr double kAbutting = 1e-6;
 
-std::vector<CornerTriangle> corners_of(std::span<const PlacedShell> shells) {
+std::vector<CornerTriangle> corners_of_shells(std::span<const PlacedShell> shells) {
   std::vector<CornerTriangle> out;
   for (const auto& [surface, pose] : shells) {
     for (const auto& t : surface->triangles) {
@@ -219,7 +219,7 @@ class ExposedPieces {
 
 }  // namespace
 
-SolidDepth::SolidDepth(std::span<const PlacedShell> shells) : all_(corners_of(shells)) {
+SolidDepth::SolidDepth(std::span<const PlacedShell> shells) : all_(corners_of_shells(shells)) {
   slack_ = slack_of(shells, all_);
   if (auto pieces = ExposedPieces(shells, all_, slack_).find()) exposed_.emplace(*pieces);
 }

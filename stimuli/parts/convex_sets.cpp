@@ -15,7 +15,7 @@
 namespace palpate::stimuli {
 namespace {
 
-constexpr int kMostSteps = 64;  // of one set
+constexpr int kMostStepsOfSet = 64;  // of one set
 
 /// Null: too thin to matter.
 MeshPointer bounded(const std::vector<HalfSpace>& planes, const Vec3& inside, double size) {
@@ -141,7 +141,7 @@ std::optional<ConvexSet> SetGrowth::step(const ConvexSet& set,
 
 ConvexSet SetGrowth::grown(ConvexSet set, const std::vector<MeshPointer>& others,
                            const Kept& kept) const {
-  for (int i = 0; i < kMostSteps; ++i) {
+  for (int i = 0; i < kMostStepsOfSet; ++i) {
     std::optional<ConvexSet> larger = step(set, others, kept, false);
     if (!larger && kept.point) larger = step(set, others, kept, true);
     if (!larger) break;

@@ -15,8 +15,8 @@
 namespace palpate::stimuli {
 namespace {
 
-constexpr double kCoplanar = 1e-9;  // of the size
-constexpr double kNothing = 1e-6;   // of a group's volume
+constexpr double kInOnePlane = 1e-9;  // of the size
+constexpr double kNothing = 1e-6;     // of a group's volume
 constexpr std::size_t kMostSentences = 3;
 
 /// The piece of a plane polygon behind a plane.
@@ -35,7 +35,7 @@ std::vector<Vec3> behind(const std::vector<Vec3>& polygon, const Facet& plane) {
 /// m^3; the cones from `middle` to the pieces of the one's facets inside the other.
 /// \param shared  whether facets of both in one plane, facing the same way, count
 double cones(const ConvexMesh& one, const ConvexMesh& other, const Vec3& middle, bool shared) {
-  const double tolerance = kCoplanar * std::max(one.size(), other.size());
+  const double tolerance = kInOnePlane * std::max(one.size(), other.size());
   double volume = 0;
   for (std::uint32_t f = 0; f < one.facets().size(); ++f) {
     std::vector<Vec3> polygon = corners_of(one, f);

@@ -7,7 +7,7 @@
 namespace palpate::stimuli {
 
 Factor::Factor(std::size_t size, const std::vector<MatrixEntry>& entries) {
-  using Matrix = Eigen::SparseMatrix<double>;
+  using Sparse = Eigen::SparseMatrix<double>;
   std::vector<Eigen::Triplet<double>> triplets;
   triplets.reserve(entries.size());
   for (const MatrixEntry& e : entries) {
@@ -15,12 +15,12 @@ Factor::Factor(std::size_t size, const std::vector<MatrixEntry>& entries) {
       triplets.emplace_back(static_cast<int>(e.row), static_cast<int>(e.column), e.value);
   }
   const auto n = static_cast<Eigen::Index>(size);
-  Matrix matrix(n, n);
+  Sparse matrix(n, n);
   matrix.setFromTriplets(triplets.begin(), triplets.end());
-  const Eigen::SimplicialLLT<Matrix> cholesky(matrix);
+  const Eigen::SimplicialLLT<Sparse> cholesky(matrix);
   if (cholesky.info() != Eigen::Success)
     throw std::invalid_argument("a matrix that is not positive definite");
-  const Matrix lower = cholesky.matrixL();
+  const Sparse lower = cholesky.matrixL();
   order_.resize(size);
   for (std::size_t i = 0; i < size; ++i)
     order_[i] =

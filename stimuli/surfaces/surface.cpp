@@ -5,7 +5,6 @@
 #include <glm/common.hpp>
 #include <glm/geometric.hpp>
 #include <limits>
-#include <numeric>
 #include <utility>
 
 #include "stimuli/surfaces/surface_search.h"
@@ -19,7 +18,7 @@ struct Volume {
   double value, bound;
 };
 
-Volume volume_of(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+Volume signed_volume(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
   const Vec3 p = a - d, q = b - d, r = c - d;
   const double x = p.y * q.z - p.z * q.y, y = p.z * q.x - p.x * q.z, z = p.x * q.y - p.y * q.x;
   const double value = r.x * x + r.y * y + r.z * z;
@@ -289,7 +288,7 @@ void Surface::find_edges() {
       const SurfaceTriangle& other = triangles_[SurfaceTriangle::triangle_of(t.across[k])];
       const std::uint32_t apex = other.corners[(SurfaceTriangle::side_of(t.across[k]) + 2) % 3];
       // Positive if the neighbour's far corner is below this triangle's plane.
-      const Volume under = volume_of(a, b, c, vertices_[apex]);
+      const Volume under = signed_volume(a, b, c, vertices_[apex]);
       if (!(under.value < -under.bound)) t.touched |= 1U << k;
     }
   }

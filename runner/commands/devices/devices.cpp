@@ -324,7 +324,7 @@ servo::DeviceConfig config_of(const po::variables_map& values) {
   return config;
 }
 
-void add_options(CommandLine& line) {
+void add_device_list_options(CommandLine& line) {
   line.usage =
       "palpate devices [--device NAME] [--timing] [--calibrate] [--markers WHERE] [--json FILE] "
       "[--report FILE]";
@@ -433,7 +433,7 @@ int try_markers(const std::vector<std::string>& names) {
 
 int devices_command(const std::vector<std::string>& args) {
   CommandLine line;
-  add_options(line);
+  add_device_list_options(line);
   const auto values = line.parse(args);
   if (!values) return 0;
   if (values->count("markers") > 0) {

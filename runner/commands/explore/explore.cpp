@@ -109,9 +109,10 @@ struct TouchedScene {
   double most_torque = 0;                     ///< N m
 };
 
-TouchedScene touch(const rendering::Scene& scene, const protocols::SceneSpec& spec,
-                   const rendering::Renderer& renderer, const std::vector<touch::TimedPose>& poses,
-                   const std::vector<std::size_t>& rows) {
+TouchedScene touch_along(const rendering::Scene& scene, const protocols::SceneSpec& spec,
+                         const rendering::Renderer& renderer,
+                         const std::vector<touch::TimedPose>& poses,
+                         const std::vector<std::size_t>& rows) {
   TouchedScene out;
   std::size_t row = 0, next = 0;
   touch::render_along(
@@ -204,7 +205,7 @@ DrawnFrames draw_frames(const std::string& scene_path, const protocols::SceneSpe
   const std::vector<std::size_t> rows = shown_rows(poses, settings.every);
   SceneBuilder builder;
   const rendering::Scene scene = touch::build_scene(builder, scene_path, spec, renderer);
-  const TouchedScene touched = touch(scene, spec, renderer, poses, rows);
+  const TouchedScene touched = touch_along(scene, spec, renderer, poses, rows);
   display::SceneDrawing drawing(spec.objects, tool_of(spec.tool));
   drawing.add_compiled(scene);
   const display::SceneDrawingSettings looks =

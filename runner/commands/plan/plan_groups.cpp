@@ -20,7 +20,7 @@ namespace po = boost::program_options;
 using analysis::GroupEffects;
 using analysis::GroupPower;
 
-GroupEffects effects_of(const GroupOptions& options) {
+GroupEffects group_effects(const GroupOptions& options) {
   if (options.groups < 2 || options.groups > 12) throw UsageError("--groups: must be 2 to 12");
   for (const auto& [name, value] : {std::pair("effect-between", options.between),
                                     std::pair("effect-interaction", options.interaction)}) {
@@ -78,7 +78,7 @@ void add_group_options(CommandLine& line, GroupOptions& options) {
 void print_group_plan(const GroupOptions& groups, const PlanOptions& options,
                       const po::variables_map& values, output::Outputs& outputs) {
   if (outputs.wanted("figure")) throw UsageError("--figure: not with --groups");
-  const GroupEffects effects = effects_of(groups);
+  const GroupEffects effects = group_effects(groups);
   const analysis::PlanSettings settings = settings_of(options, values);
   if (settings.simulation.test == analysis::StudyTest::model)
     throw UsageError("--test model: not with --groups, which are tested by analysis of variance");

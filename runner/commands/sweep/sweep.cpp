@@ -93,14 +93,14 @@ using nlohmann::json;
 using sweep::PlannedSweep;
 using sweep::Sweep;
 
-struct RunSettings {
+struct SweepSettings {
   sweep::SweepSettings sweep;
   std::string database, shard;
   std::int64_t print_point = 0;  ///< 0: none, the sweep runs
   int jobs = 1;
 };
 
-void add_options(CommandLine& line, RunSettings& settings) {
+void add_options(CommandLine& line, SweepSettings& settings) {
   line.usage =
       "palpate sweep PROTOCOL.json --space SPACE.json --points N --db FILE [--design NAME]\n"
       "       [--seed S] [--participants N] [--repetitions R] [--jobs J] [--shard K/N|auto]";
@@ -133,8 +133,8 @@ void add_options(CommandLine& line, RunSettings& settings) {
 }
 
 /// None: --help was given and printed. \throws UsageError
-std::optional<RunSettings> parse_run_settings(const std::vector<std::string>& args) {
-  RunSettings settings;
+std::optional<SweepSettings> parse_sweep_settings(const std::vector<std::string>& args) {
+  SweepSettings settings;
   settings.jobs = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   CommandLine line;
   add_options(line, settings);
@@ -265,7 +265,7 @@ void print_summary(data::SweepFile& file, const data::SweepPlan& plan, const std
   std::cerr << "the column 'reason' has the reasons: palpate export --db FILE --format csv\n";
 }
 
-int run_shard(const Sweep& sweep, const RunSettings& settings, const Shard& shard,
+int run_shard(const Sweep& sweep, const SweepSettings& settings, const Shard& shard,
               const std::string& name) {
   data::SweepFile file = data::SweepFile::open(settings.database, sweep.plan);
   warn_of_exposure(settings.database);
@@ -305,7 +305,7 @@ void print_point(const Sweep& sweep, std::int64_t point) {
 }  // namespace
 
 int sweep_command(const std::vector<std::string>& args) {
-  std::optional<RunSettings> settings = parse_run_settings(args);
+  std::optional<SweepSettings> settings = parse_sweep_settings(args);
   if (!settings) return 0;
   const Shard shard =
       parse_shard(settings->shard, [](const char* name) { return std::getenv(name); });

@@ -36,7 +36,7 @@ void finish(asio::io_context& io, const bool& done, const Code& error, const std
   if (error) throw LinkError(what + ": " + error.message());
 }
 
-void open(asio::io_context& io, asio::ip::tcp::socket& socket, const std::string& service) {
+void connect_to(asio::io_context& io, asio::ip::tcp::socket& socket, const std::string& service) {
   const auto [host, port] = host_and_port(service);
   Code error;
   asio::ip::tcp::resolver resolver(io);
@@ -54,7 +54,7 @@ void open(asio::io_context& io, asio::ip::tcp::socket& socket, const std::string
 class BeastLink final : public Link {
  public:
   explicit BeastLink(const std::string& service) : socket_(io_) {
-    open(io_, socket_.next_layer(), service);
+    connect_to(io_, socket_.next_layer(), service);
     socket_.read_message_max(kLongest);
     bool done = false;
     Code error;
@@ -118,7 +118,7 @@ std::string get(const std::string& service, const std::string& target) {
   namespace http = beast::http;
   asio::io_context io{1};
   asio::ip::tcp::socket socket(io);
-  open(io, socket, service);
+  connect_to(io, socket, service);
   http::request<http::empty_body> request{http::verb::get, target, 11};
   request.set(http::field::host, service);
   request.set(http::field::connection, "close");

@@ -22,7 +22,7 @@ namespace {
 constexpr float kBetween = 2;  // px
 constexpr int kMostRows = 6;   // above and below its place
 
-bool overlap(const LabelBox& a, const LabelBox& b) {
+bool labels_overlap(const LabelBox& a, const LabelBox& b) {
   const glm::vec2 apart = glm::abs(a.centre - b.centre);
   const glm::vec2 least = 0.5F * (a.size + b.size) + glm::vec2(kBetween);
   return apart.x < least.x && apart.y < least.y;
@@ -184,9 +184,9 @@ void place_labels(std::vector<LabelBox>& boxes, const glm::vec2& picture) {
       const glm::vec2 moved =
           wanted + glm::vec2(0, static_cast<float>(rows) * (box.size.y + kBetween));
       box.centre = glm::clamp(moved, low, high);
-      free =
-          std::none_of(boxes.begin(), boxes.begin() + static_cast<std::ptrdiff_t>(i),
-                       [&](const LabelBox& other) { return other.shown && overlap(box, other); });
+      free = std::none_of(
+          boxes.begin(), boxes.begin() + static_cast<std::ptrdiff_t>(i),
+          [&](const LabelBox& other) { return other.shown && labels_overlap(box, other); });
     }
     box.shown = box.shown && free;
   }

@@ -36,8 +36,8 @@ Nearest nearest(const Vec3& c, const Vec3& e, const rendering::LineProbe& probe)
   return {on_edge, on_probe, w + on_probe * d - on_edge * e};
 }
 
-rendering::LineProbe between(const rendering::LineProbe& a, const rendering::LineProbe& b,
-                             double t) {
+rendering::LineProbe probe_between(const rendering::LineProbe& a, const rendering::LineProbe& b,
+                                   double t) {
   return {a.tip + t * (b.tip - a.tip), a.tail + t * (b.tail - a.tail)};
 }
 
@@ -62,7 +62,7 @@ bool inside(const stimuli::ConvexMesh& mesh, const rendering::LineProbe& probe) 
 bool enters(const stimuli::ConvexMesh& mesh, const rendering::LineProbe& before,
             const rendering::LineProbe& after) {
   for (int i = 1; i <= kFine; ++i) {
-    if (inside(mesh, between(before, after, i / static_cast<double>(kFine)))) return true;
+    if (inside(mesh, probe_between(before, after, i / static_cast<double>(kFine)))) return true;
   }
   return false;
 }

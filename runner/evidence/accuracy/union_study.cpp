@@ -169,7 +169,7 @@ rendering::Scene scene_of(const UnionCase& one, bool apart, rendering::Tool tool
   return rendering::Scene(std::move(objects), !is_point(one.tool), std::move(tool));
 }
 
-const rendering::Renderer& renderer_for(const OracleTool& tool) {
+const rendering::Renderer& renderer_of_tool(const OracleTool& tool) {
   return is_point(tool) ? rendering::point_renderer() : rendering::ray_renderer();
 }
 
@@ -177,7 +177,7 @@ class Law final : public UnionRun {
  public:
   explicit Law(const UnionCase& one)
       : tool_(one.tool),
-        renderer_(renderer_for(one.tool)),
+        renderer_(renderer_of_tool(one.tool)),
         scene_(scene_of(one, false, tool_of(one.tool))),
         state_(scene_.initial_state()) {}
 
@@ -216,7 +216,7 @@ class Law final : public UnionRun {
 class OnePerPart final : public UnionRun {
  public:
   explicit OnePerPart(const UnionCase& one)
-      : tool_(one.tool), renderer_(renderer_for(one.tool)), scene_(scene_of(one, true, {})) {
+      : tool_(one.tool), renderer_(renderer_of_tool(one.tool)), scene_(scene_of(one, true, {})) {
     states_.resize(tool_.size(), scene_.initial_state());
   }
 

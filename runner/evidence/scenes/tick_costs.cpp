@@ -590,9 +590,13 @@ void measure_effect_costs(TickTimer& timer, std::size_t ticks,
                                           {"plate, noise", 100, plate},
                                           {"plate, curl field", 15, plate},
                                           {"plate, knock", 15, plate}}};
-  rows[1].object.texture = {.period = 0.002, .depth = 0.0003};
-  rows[2].object.texture = {
-      .kind = stimuli::TextureSpec::Kind::noise, .period = 0.002, .depth = 0.0002};
+  stimuli::TextureSpec texture;
+  texture.period = 0.002;
+  texture.depth = 0.0003;
+  rows[1].object.texture = texture;
+  texture.kind = stimuli::TextureSpec::Kind::noise;
+  texture.depth = 0.0002;
+  rows[2].object.texture = texture;
   stimuli::FieldSpec curl;
   curl.kind = stimuli::FieldSpec::Kind::curl;
   curl.damping = Mat3(10);

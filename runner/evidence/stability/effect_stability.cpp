@@ -14,13 +14,13 @@
 namespace palpate::runner::evidence {
 namespace {
 
-constexpr double kPeriod = 1e-3;    // s
-constexpr double kStiffness = 800;  // N/m
-constexpr double kTop = 0.01;       // m, of the plate
-constexpr double kSlow = 60;        // ticks in a radian's time: the case of the theory
-constexpr double kAtRest = 1e-2;    // of the first swing
-constexpr double kFinest = 1.01;    // factor between dampings that are told apart
-constexpr int kTicks = 1 << 14, kLongest = 1 << 18;
+constexpr double kPeriod = 1e-3;          // s
+constexpr double kTestedStiffness = 800;  // N/m
+constexpr double kTop = 0.01;             // m, of the plate
+constexpr double kSlow = 60;              // ticks in a radian's time: the case of the theory
+constexpr double kComesToRest = 1e-2;     // of the first swing
+constexpr double kFinest = 1.01;          // factor between dampings that are told apart
+constexpr int kFirstTicks = 1 << 14, kLongest = 1 << 18;
 
 /// A mass under a force that is held over each tick, with viscous damping, integrated exactly.
 struct Mass {
@@ -61,21 +61,21 @@ bool rests(const Case& of, double damping) {
   force_at(of.start + Vec3(0, 0, 0.02));
   Mass mass{of.start, of.velocity, of.mass, damping};
   double first = 0, before = 0;
-  for (int length = kTicks; length <= kLongest; length *= 2) {
+  for (int length = kFirstTicks; length <= kLongest; length *= 2) {
     // The swing of speed in the second half of the run so far.
     double early = 0, late = 0;
-    for (int i = length == kTicks ? 0 : length / 2; i < length; ++i) {
+    for (int i = length == kFirstTicks ? 0 : length / 2; i < length; ++i) {
       mass.step(force_at(mass.place) + of.press);
       const double speed = glm::length(mass.velocity);
       if (!(speed < 1e3)) return false;
-      if (i < kTicks / 8) first = std::max(first, speed);
+      if (i < kFirstTicks / 8) first = std::max(first, speed);
       (i < 3 * length / 4 ? early : late) = std::max(i < 3 * length / 4 ? early : late, speed);
     }
-    if (late <= kAtRest * first) return true;
+    if (late <= kComesToRest * first) return true;
     if (late > 0.98 * early && before > 0 && late > 0.98 * before) return false;
     before = late;
   }
-  return before <= kAtRest * first;
+  return before <= kComesToRest * first;
 }
 
 double least_damping(const Case& of) {
@@ -97,7 +97,7 @@ stimuli::ObjectSpec plate() {
   stimuli::ObjectSpec out;
   out.shape = stimuli::ShapeKind::box;
   out.size = {0.2, 0.2, 2 * kTop};
-  out.material.stiffness = kStiffness;
+  out.material.stiffness = kTestedStiffness;
   return out;
 }
 
@@ -107,7 +107,9 @@ std::string named(const char* format, double a, double b, double c = 0) {
   return text;
 }
 
-double slow_mass() { return kStiffness * std::pow(kSlow * kPeriod / (2 * std::numbers::pi), 2); }
+double slow_mass() {
+  return kTestedStiffness * std::pow(kSlow * kPeriod / (2 * std::numbers::pi), 2);
+}
 
 void add_textures(std::vector<Case>& out) {
   for (const double depth : {0.0001, 0.0004}) {
@@ -119,11 +121,11 @@ void add_textures(std::vector<Case>& out) {
         one.object.texture.emplace();
         one.object.texture->period = period;
         one.object.texture->depth = depth;
-        one.start = {period / 2, 0, kTop - depth - press / kStiffness};
+        one.start = {period / 2, 0, kTop - depth - press / kTestedStiffness};
         one.velocity = {0.002, 0, 0};
         one.press = {0, 0, -press};
         one.mass = slow_mass();
-        one.theory = kStiffness * kPeriod / 2;
+        one.theory = kTestedStiffness * kPeriod / 2;
         out.push_back(one);
       }
     }
@@ -162,7 +164,7 @@ void add_knocks(std::vector<Case>& out) {
     one.velocity = {0, 0, -0.05};
     one.press = {0, 0, -1};
     one.mass = slow_mass();
-    one.theory = kStiffness * kPeriod / 2;
+    one.theory = kTestedStiffness * kPeriod / 2;
     out.push_back(one);
   }
 }

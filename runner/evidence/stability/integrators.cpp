@@ -12,13 +12,13 @@
 namespace palpate::runner::evidence {
 namespace {
 
-constexpr int kTicks = 500;
+constexpr int kTimedTicks = 500;
 
 std::vector<double> forces() {
   Random random(1);
   std::vector<double> out;
-  out.reserve(kTicks);
-  for (int i = 0; i < kTicks; ++i) out.push_back(4 * random.unit() - 2);
+  out.reserve(kTimedTicks);
+  for (int i = 0; i < kTimedTicks; ++i) out.push_back(4 * random.unit() - 2);
   return out;
 }
 
@@ -106,7 +106,7 @@ IntegratorRow measure(const Oscillator& o, const char* method, int steps,
     for (int lap = 0; lap < laps; ++lap) {
       for (const double force : inputs) sink += timed(force);
     }
-    best = std::min(best, (now_ns() - start) / (laps * kTicks));
+    best = std::min(best, (now_ns() - start) / (laps * kTimedTicks));
   }
   row.ns_per_tick = sink == 0.123456789 ? 0 : best;  // prevents the compiler from removing the loop
   return row;

@@ -68,8 +68,8 @@ bool projects_into(const stimuli::ConvexMesh& mesh, const stimuli::Facet& facet,
   return true;
 }
 
-rendering::LineProbe between(const rendering::LineProbe& before, const rendering::LineProbe& after,
-                             double time) {
+rendering::LineProbe probe_between(const rendering::LineProbe& before,
+                                   const rendering::LineProbe& after, double time) {
   return {before.tip + time * (after.tip - before.tip),
           before.tail + time * (after.tail - before.tail)};
 }
@@ -126,7 +126,8 @@ std::optional<double> reference_first_contact(const stimuli::ConvexMesh& mesh,
                                               const rendering::LineProbe& before,
                                               const rendering::LineProbe& after, int steps) {
   const auto penetrates = [&](double time) {
-    return reference_depth(mesh, between(before, after, time)).depth > kTouchingDepth * mesh.size();
+    return reference_depth(mesh, probe_between(before, after, time)).depth >
+           kTouchingDepth * mesh.size();
   };
   if (penetrates(0)) return 0.0;
   for (int step = 1; step <= steps; ++step) {

@@ -16,11 +16,11 @@ namespace {
 
 // m, longest step of the search, for objects from 50 mm on; smaller ones get shorter steps.
 constexpr double kStep = 1e-5, kStepOfSize = 2e-4;
-constexpr double kSkin = 1e-9;                // of the size
-constexpr double kRounding = 1e-10;           // of the size; below the skin
-constexpr int kMostParts = 4000;              // of a tick: 40 mm in a tick
-constexpr int kMostSteps = 20000;             // of a search
-constexpr double kFlat = 0.0348994967025010;  // sin of 2 degrees
+constexpr double kSkin = 1e-9;                 // of the size
+constexpr double kRounding = 1e-10;            // of the size; below the skin
+constexpr int kMostParts = 4000;               // of a tick: 40 mm in a tick
+constexpr int kMostSteps = 20000;              // of a search
+constexpr double kPlane = 0.0348994967025010;  // sin of 2 degrees
 
 Vec3 mixed(const Vec3& a, const Vec3& b, double share) { return a + share * (b - a); }
 
@@ -209,7 +209,7 @@ void SurfaceReference::collect_ends(const Face& face, const ReferenceSegment& ro
     if (!over) continue;
     bounds_.push_back({face.normal, glm::dot(face.normal, face.corners[0] - relative) + skin_,
                        face.stiffness, index, static_cast<double>(end),
-                       !is_point && std::abs(slope) < kFlat * glm::length(d)});
+                       !is_point && std::abs(slope) < kPlane * glm::length(d)});
   }
 }
 
@@ -233,7 +233,7 @@ void SurfaceReference::collect_ridge(const Ridge& ridge, const ReferenceSegment&
   if (along * std::sqrt(dd) < -tiny || (along - 1) * std::sqrt(dd) > tiny) return;
   const auto room = [&](bool stops) { return (stops ? tiny : beyond) / std::sqrt(ee); };
   if (on_edge < -room(ridge.ends[0]) || on_edge > 1 + room(ridge.ends[1])) return;
-  const double flat = kFlat * std::sqrt(dd);
+  const double flat = kPlane * std::sqrt(dd);
   bounds_.push_back({normal, glm::dot(normal, ridge.from - rod.from) + skin_, ridge.stiffness,
                      index, std::clamp(along, 0.0, 1.0),
                      std::abs(left) < flat || std::abs(right) < flat});

@@ -20,8 +20,8 @@ constexpr double kStylus = 0.12;                      // m, of a stylus that car
 constexpr double kSpring = 800;                       // N/m
 constexpr double kInside = 1e-12, kMinimal = 1e-9;    // sizes
 constexpr double kTouchingSizes = 1e-11;              // sizes
-constexpr double kFlat = 2 * std::numbers::pi / 180;  // rad
-const double kSinBlend = std::sin(kFlat / 2);         // of equation (2)
+constexpr double kPlane = 2 * std::numbers::pi / 180;  // rad
+const double kSinBlend = std::sin(kPlane / 2);         // of equation (2)
 constexpr double kTurned = 1e-9;                      // rad; less is rounding
 constexpr std::uint32_t kCounted =
     rendering::render_fault::kContactCapped | rendering::render_fault::kReleased;
@@ -201,7 +201,7 @@ class UnionWalker {
     return std::any_of(
         solid.mesh->facets().begin(), solid.mesh->facets().end(), [&](const stimuli::Facet& facet) {
           const Vec3 normal = solid.pose.orientation * facet.normal;
-          return std::abs(std::numbers::pi / 2 - angle_between(normal, along)) < kFlat;
+          return std::abs(std::numbers::pi / 2 - angle_between(normal, along)) < kPlane;
         });
   }
 
