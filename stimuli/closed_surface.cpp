@@ -60,6 +60,32 @@ class Cleaner {
   }
 
   CleanedSurface run() {
+    clean();
+    ClosedSurface surface = take_surface();
+    surface.coordinate_error = soup_.coordinate_error;
+    surface.flat_face = find_flat_faces(surface, kPlaneErrors * error_);
+    if (given_up_) cut_flat_faces_anew(surface);
+    Pockets pockets = given_up_ ? checked_meanwhile(surface) : checked(surface);
+    if (pockets.depth > 0) {
+      char text[200];
+      std::snprintf(text, sizeof text,
+                    "it passes through itself, at (%.6g, %.6g, %.6g) m by %.2g m: no hand can feel "
+                    "that",
+                    pockets.place.x, pockets.place.y, pockets.place.z, pockets.depth);
+      notes_.emplace_back(text);
+    }
+    surface.at_pockets = std::move(pockets.triangles);
+    if (!given_up_) cut_flat_faces_anew(surface);  // the check named triangles by their faces
+    return {std::move(surface), std::move(notes_)};
+  }
+
+  std::vector<std::string> notes() {
+    clean();
+    return std::move(notes_);
+  }
+
+ private:
+  void clean() {
     check_numbers(soup_);
     take_corners();
     take_faces();
@@ -82,25 +108,13 @@ class Cleaner {
       note(flat.corners, (std::string("corner") + text).c_str(),
            (std::string("corners, each") + text).c_str());
     }
-    ClosedSurface surface = take_surface();
-    surface.coordinate_error = soup_.coordinate_error;
-    surface.flat_face = find_flat_faces(surface, kPlaneErrors * error_);
-    if (given_up_) cut_flat_faces_anew(surface);
-    Pockets pockets = given_up_ ? checked_meanwhile(surface) : checked(surface);
-    if (pockets.depth > 0) {
-      char text[200];
-      std::snprintf(text, sizeof text,
-                    "it passes through itself, at (%.6g, %.6g, %.6g) m by %.2g m: no hand can feel "
-                    "that",
-                    pockets.place.x, pockets.place.y, pockets.place.z, pockets.depth);
-      notes_.emplace_back(text);
+    if (triangles_.empty()) {
+      MeshFaults faults;
+      faults.add("flat", [] { return "expected a solid, found no volume"; });
+      faults.throw_if_any();
     }
-    surface.at_pockets = std::move(pockets.triangles);
-    if (!given_up_) cut_flat_faces_anew(surface);  // the check named triangles by their faces
-    return {std::move(surface), std::move(notes_)};
   }
 
- private:
   void note(std::size_t count, const char* one, const char* many) {
     if (count > 0) notes_.push_back(counted(count, one, many));
   }
@@ -565,11 +579,6 @@ class Cleaner {
 
   ClosedSurface take_surface() {
     ClosedSurface surface;
-    if (triangles_.empty()) {
-      MeshFaults faults;
-      faults.add("flat", [] { return "expected a solid, found no volume"; });
-      faults.throw_if_any();
-    }
     std::vector<Index> number(points_.size(), kNoPoint);
     surface.vertices.reserve(points_.size());
     for (Triangle& t : triangles_) {
@@ -606,6 +615,8 @@ class Cleaner {
 }  // namespace
 
 CleanedSurface closed_surface(const PolygonSoup& soup) { return Cleaner(soup).run(); }
+
+std::vector<std::string> cleaning_notes(const PolygonSoup& soup) { return Cleaner(soup).notes(); }
 
 CleanedSurface closed_surface(PolygonSoup&& soup,
                               const std::function<void(const ClosedSurface&)>& meanwhile) {

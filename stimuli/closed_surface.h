@@ -52,6 +52,10 @@ CleanedSurface closed_surface(const PolygonSoup& soup);
 CleanedSurface closed_surface(PolygonSoup&& soup,
                               const std::function<void(const ClosedSurface&)>& meanwhile);
 
+/// The notes of closed_surface(), for polygons that are known to bound convex solids.
+/// \throws MeshError  as that one, but for how they wind
+std::vector<std::string> cleaning_notes(const PolygonSoup& soup);
+
 /// Pockets, where a surface winds round a place a negative number of times, because it passes
 /// through itself.
 struct Pockets {

@@ -110,7 +110,7 @@ std::vector<std::string> mesh_notes(const stimuli::ObjectSpec& object, SceneBuil
   std::vector<std::string> cleaned = mesh.notes;
   if (mesh.surface == nullptr) {
     try {
-      cleaned = stimuli::closed_surface(stimuli::polygons_of(object)).notes;
+      cleaned = stimuli::cleaning_notes(stimuli::polygons_of(object));
     } catch (const stimuli::MeshError&) {
       // It is convex anyway, within its coordinates' error.
     }

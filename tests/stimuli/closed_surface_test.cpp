@@ -127,6 +127,7 @@ TEST(ClosedSurfaceTest, BentFacesAreCutNotRefused) {
             "face 0 (vertices 0 3 2 1) is bent by 0.0026 m; cut between vertices 3 and 1\n"
             "face 2 (vertices 0 1 5 4) is bent by 0.0026 m; cut between vertices 1 and 4\n"
             "face 5 (vertices 3 0 4 7) is bent by 0.0026 m; cut between vertices 3 and 4\n");
+  EXPECT_EQ(cleaning_notes(soup), cleaned.notes);
 }
 
 TEST(ClosedSurfaceTest, NamesTheDiagonalOfBentFaces) {
