@@ -312,11 +312,11 @@ int analyze_command(const std::vector<std::string>& args) {
   }
   study::Study study = study::read_study({database, csv, protocol, protocols_in(design)},
                                          outputs.wanted("report") || outputs.wanted("figures"));
-  if (study.table.trials.empty() &&
-      (!(*values)["function"].defaulted() || values->count("scale") || values->count("glmm")))
-    throw UsageError("--function, --scale, --glmm: there are no tasks with psychometric functions");
   const analysis::StudyAnalysis analysis =
       analysis::analyze_study(std::move(study.table), functions, settings, PALPATE_VERSION);
+  if ((!(*values)["function"].defaulted() || values->count("scale") || values->count("glmm")) &&
+      std::ranges::all_of(analysis.cells, [](const auto& cell) { return cell.functions.empty(); }))
+    throw UsageError("--function, --scale, --glmm: there are no tasks with psychometric functions");
   if (functions.answer_model && analysis.answer_models.empty())
     throw UsageError("--glmm: there are no comparisons or detections with levels");
   put(outputs, analysis, study.record);

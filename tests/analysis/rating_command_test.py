@@ -155,6 +155,13 @@ class Ratings(unittest.TestCase):
         self.palpate("simulate", self.path / "p.json", "--db", self.path / "s.db", "--participants", 5)
         return ["--db", self.path / "s.db"]
 
+    def test_options_of_functions_are_refused(self):
+        table, _ = self.named_study(1, 2)
+        for option in (["--function", "logistic"], ["--scale", "log"], ["--glmm"]):
+            done = subprocess.run([PALPATE, "analyze", "--csv", table, *option], capture_output=True, text=True)
+            self.assertEqual((done.returncode, done.stdout), (2, ""), option)
+            self.assertIn("there are no tasks with psychometric functions", done.stderr)
+
     def test_labelled_steps_get_no_power_law(self):
         source = self.study(scale=[{"label": "smooth"}, {"label": "so so"}, {"label": "rough"}, {"label": "never said"}])
         text, found = self.analysed(source)
