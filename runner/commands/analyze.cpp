@@ -315,7 +315,8 @@ int analyze_command(const std::vector<std::string>& args) {
   const analysis::StudyAnalysis analysis =
       analysis::analyze_study(std::move(study.table), functions, settings, PALPATE_VERSION);
   if ((!(*values)["function"].defaulted() || values->count("scale") || values->count("glmm")) &&
-      std::ranges::all_of(analysis.cells, [](const auto& cell) { return cell.functions.empty(); }))
+      std::ranges::all_of(analysis.cells,
+                          [](const auto& cell) { return cell.functions.empty() && !cell.field; }))
     throw UsageError("--function, --scale, --glmm: there are no tasks with psychometric functions");
   if (functions.answer_model && analysis.answer_models.empty())
     throw UsageError("--glmm: there are no comparisons or detections with levels");
