@@ -16,13 +16,13 @@
 namespace palpate::runner::evidence {
 namespace {
 
-constexpr double kStylus = 0.12;                      // m, of a stylus that carries a tool
-constexpr double kSpring = 800;                       // N/m
-constexpr double kInside = 1e-12, kMinimal = 1e-9;    // sizes
-constexpr double kTouchingSizes = 1e-11;              // sizes
+constexpr double kStylus = 0.12;                       // m, of a stylus that carries a tool
+constexpr double kSpring = 800;                        // N/m
+constexpr double kInside = 1e-12, kMinimal = 1e-9;     // sizes
+constexpr double kTouchingSizes = 1e-11;               // sizes
 constexpr double kPlane = 2 * std::numbers::pi / 180;  // rad
 const double kSinBlend = std::sin(kPlane / 2);         // of equation (2)
-constexpr double kTurned = 1e-9;                      // rad; less is rounding
+constexpr double kTurned = 1e-9;                       // rad; less is rounding
 constexpr std::uint32_t kCounted =
     rendering::render_fault::kContactCapped | rendering::render_fault::kReleased;
 
