@@ -13,6 +13,7 @@
 #include "analysis/statistics/group_psychometric.h"
 #include "analysis/statistics/task_analysis.h"
 #include "analysis/text.h"
+#include "data/base/words.h"
 
 namespace palpate::analysis {
 namespace {
@@ -154,12 +155,6 @@ std::vector<GroupMeasure> measures_of(const GroupTask& task) {
   return out;
 }
 
-std::string listed_names(const std::vector<std::string>& names) {
-  std::string text;
-  for (const std::string& name : names) text += (text.empty() ? "" : ", ") + printable(name);
-  return text;
-}
-
 std::string capital(const std::string& measure) {
   if (measure == "jnd") return "JND";
   if (measure == "pse") return "PSE";
@@ -187,7 +182,7 @@ void put_notes(const GroupTask& task, std::size_t c, GroupCoordinate coordinate,
   if (row.measure == "jnd" && !task.model.standard &&
       std::exp(moments.mean) < task.data.least_spacing / 2)
     note("levels too coarse for the JND: it may be too large");
-  if (!task.no_answers[c].empty()) note("no trials: " + listed_names(task.no_answers[c]));
+  if (!task.no_answers[c].empty()) note("no trials: " + printable(listed(task.no_answers[c])));
   if (task.reversed[c] > 0)
     note(counted(task.reversed[c], "participant", "participants") +
          " with reversed answers left out");
