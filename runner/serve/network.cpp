@@ -255,7 +255,9 @@ class WebClient final : public Client {
         [self = shared_from_this(), this](const Code& error, std::size_t) { written(error); });
   }
   Hub& hub_;
-  websocket::stream<beast::basic_stream<tcp, tcp::socket::executor_type, CountedBytes>> stream_;
+  // Without compression (false), which this server offers to nobody.
+  websocket::stream<beast::basic_stream<tcp, tcp::socket::executor_type, CountedBytes>, false>
+      stream_;
   beast::flat_buffer buffer_;
 };
 

@@ -102,7 +102,7 @@ class BeastLink final : public Link {
 
  private:
   asio::io_context io_{1};
-  beast::websocket::stream<asio::ip::tcp::socket> socket_;
+  beast::websocket::stream<asio::ip::tcp::socket, false> socket_;
   beast::flat_buffer buffer_;
   bool reading_ = false, arrived_ = false;
   Code read_error_;
